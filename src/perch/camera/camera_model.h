@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace perch {
+
+using Matrix23d = Eigen::Matrix<double, 2, 3>;
+
+// How a camera projects: any lens model that libmrcal knows. Camera frame: x right, y down, z forward, m.
+// Pixels: integer coordinates are pixel centres, (0, 0) the centre of the top-left pixel.
+// Cheap to copy; all calls are const and may run in several threads.
+class CameraModel {
+ public:
+  // `lens` is mrcal's name with its configuration ("LENSMODEL_OPENCV4", "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_..."),
+  // `intrinsics` fx fy cx cy and its distortions. Throws std::invalid_argument for a lens mrcal does not know,
+  // a wrong number of intrinsics, NaN, or a size or focal length that is not positive.
+  CameraModel(const std::string& lens, std::vector<double> intrinsics, int width, int height);
+
+  // fx, fy, cx, cy without distortion.
+  static CameraModel pinhole(double fx, double fy, double cx, double cy, int width, int height);
+
+  // The pixel of a point; empty when the point is not in front of the camera or the result is not finite.
+  std::optional<Eigen::Vector2d> pixel_from_camera(const Eigen::Vector3d& p_camera) const;
+  // The same with d pixel / d p_camera.
+  std::optional<Eigen::Vector2d> pixel_from_camera(const Eigen::Vector3d& p_camera, Matrix23d* jacobian) const;
+
+  // The direction in which a pixel looks, of unit length. Empty when the inversion does not converge, that is
+  // when its projection is not the pixel again to 1e-6 px: outside the part of the picture the lens model is
+  // valid in. CAHVORE has no inverse in libmrcal: always empty.
+  std::optional<Eigen::Vector3d> ray_from_pixel(const Eigen::Vector2d& pixel) const;
+
+  int width() const;
+  int height() const;
+  const std::string& lens() const;
+  const std::vector<double>& intrinsics() const;
+
+ private:
+  struct Lens;
+  std::shared_ptr<const Lens> lens_;
+};
+
+// Reads *.cameramodel (mrcal), a ROS camera_info YAML, an OpenCV FileStorage YAML or an ASL sensor.yaml, told
+// apart by what is in the file. Throws ConfigError naming the file, the line where there is one, and the cause.
+CameraModel read_camera_model(const std::filesystem::path& file);
+
+}  // namespace perch

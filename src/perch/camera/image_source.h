@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace perch {
+
+enum class Channel { kGrey, kRed, kGreen, kBlue };
+
+// One picture. An unreadable one is a frame too: it keeps its row in every output.
+struct Frame {
+  int64_t timestamp_ns = 0;  // mid-exposure, on the camera's clock
+  cv::Mat grey;              // CV_8UC1, continuous; empty when `problem` says why
+  std::string name;          // file, or file#number of a video
+  std::string problem;       // "…/17.png: truncated", empty when all is well
+};
+
+// Pictures in their order. Not thread-safe.
+class ImageSource {
+ public:
+  virtual ~ImageSource() = default;
+  // False after the last one.
+  virtual bool next(Frame& frame) = 0;
+  // How many there are; -1 when that cannot be known.
+  virtual int64_t size() const = 0;
+  // What was wrong with the source as a whole and was skipped: rows of data.csv, a clock that went back.
+  const std::vector<std::string>& problems() const { return problems_; }
+
+ protected:
+  std::vector<std::string> problems_;
+};
+
+// Opens what `camera.source` names: flight:FOLDER, images:GLOB, video:FILE (and from later work v4l2:, gst:,
+// sim:). Throws std::runtime_error naming what cannot be opened and why.
+std::unique_ptr<ImageSource> open_image_source(const std::string& source, Channel channel = Channel::kGrey);
+
+// Reads one picture as `Frame::grey`: 8 or 16 bits, grey or colour, with an alpha or not. Sets `problem` and
+// leaves `grey` empty when the file is missing, empty, truncated or no picture.
+void read_picture(const std::filesystem::path& file, Channel channel, Frame& frame);
+
+}  // namespace perch

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "perch/geometry/uncertainty.h"
+
+namespace perch {
+
+// A measured feature of the target.
+struct Correspondence {
+  int feature = 0;  // index into LandingTarget::features
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double sigma_px = 1;  // standard deviation of each coordinate
+};
+
+enum class DetectionStatus { kFound, kNoTarget, kPartial };
+
+// How long a step of the detector took.
+struct StageTime {
+  std::string_view stage;  // of static storage: "threshold", "segmentation", ...
+  double us = 0;
+};
+
+struct Detection {
+  DetectionStatus status = DetectionStatus::kNoTarget;
+  std::vector<Correspondence> correspondences;  // empty unless found
+  std::vector<StageTime> stages;
+  int threshold = -1;  // grey level, where the method has one
+};
+
+// Where the target is expected, from the previous frames.
+struct Prediction {
+  UncertainRigid3 camera_from_target;
+};
+
+// Finds the target in a picture. Keeps its buffers from call to call, so one Detector serves one thread; it
+// remembers nothing else: the same picture and prediction give the same result.
+class Detector {
+ public:
+  virtual ~Detector() = default;
+  // `grey` is CV_8UC1 of any size. The result is reused by the next call.
+  virtual const Detection& detect(const cv::Mat& grey, const std::optional<Prediction>& prediction) = 0;
+};
+
+}  // namespace perch

@@ -1,0 +1,50 @@
+#include "perch/frames/frame_chain.h"
+
+namespace perch {
+
+FrameChain read_frame_chain(Section frames) {
+  FrameChain chain;
+  if (frames.has("base_from_camera") && frames.is_mapping_with("base_from_camera", "pan_tilt")) {
+    Section base = frames.section("base_from_camera");
+    Section head = base.section("pan_tilt");
+    PanTilt pan_tilt;
+    head.read("base_from_zero", pan_tilt.base_from_zero);
+    head.done();
+    base.done();
+    chain.pan_tilt = pan_tilt;
+  } else {
+    frames.read("base_from_camera", chain.base_from_camera);
+  }
+  frames.read("body_from_base", chain.body_from_base);
+  frames.read("target_from_pad", chain.target_from_pad);
+  frames.read("world_from_pad", chain.world_from_pad);
+  // Clocks further apart are not offset but unrelated; no flight lasts longer than a day.
+  frames.read("time_offset", chain.time_offset, Range{-86400, 86400});
+  frames.done();
+  return chain;
+}
+
+Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
+  if (!chain.pan_tilt) return chain.base_from_camera;
+  const HeadAngles a = angles.value_or(HeadAngles{});
+  const Eigen::Quaterniond pan(Eigen::AngleAxisd(a.pan, Eigen::Vector3d::UnitY()));
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(a.tilt, Eigen::Vector3d::UnitX()));
+  return chain.pan_tilt->base_from_zero * Rigid3{pan * tilt, Eigen::Vector3d::Zero()};
+}
+
+UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,
+                                        const std::optional<HeadAngles>& angles) {
+  const Rigid3 body_from_base = chain.body_from_base.value_or(Rigid3{});
+  const Rigid3 camera_from_base = inverse(base_from_camera(chain, angles));
+  const Rigid3 camera_from_body = camera_from_base * inverse(body_from_base);
+  const Rigid3 pad_from_target = inverse(chain.target_from_pad);
+  const UncertainRigid3 target_from_camera = inverse(camera_from_target);
+  return UncertainRigid3{pad_from_target} * target_from_camera * UncertainRigid3{camera_from_body};
+}
+
+std::optional<Rigid3> pad_from_body_by_navigation(const FrameChain& chain, const Rigid3& world_from_body) {
+  if (!chain.world_from_pad) return std::nullopt;
+  return inverse(*chain.world_from_pad) * world_from_body;
+}
+
+}  // namespace perch

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <optional>
+
+#include "perch/config/section.h"
+#include "perch/geometry/uncertainty.h"
+
+namespace perch {
+
+// A pan/tilt head between the base and the camera. At zero angles the camera sits at base_from_zero; the tilt axis
+// moves with the pan. Positive pan turns the camera right (the target moves left in the picture), positive tilt
+// turns it up (the target moves down): the paper's section 3.2, with the base's axes those of a camera
+// (x right, y down, z forward) and the optical centre on both axes.
+struct PanTilt {
+  Rigid3 base_from_zero;
+};
+
+struct HeadAngles {
+  double pan = 0, tilt = 0;  // rad
+};
+
+// The frame chain of the paper's figure 3.2; the letters are those of its table 3.1.
+//
+//   target (a) -- pad (b) ~~ camera (c) -- base (d) -- body (e) ~~ world (f) -- pad (b)
+//       target_from_pad  vision   base_from_camera  body_from_base  nav   world_from_pad
+//
+// The answer a user wants: pad_from_body = (camera_from_pad)^-1 * camera_from_base * base_from_body.
+// Navigation says the same as pad_from_world * world_from_body; the paper uses that to compare only.
+struct FrameChain {
+  Rigid3 target_from_pad;                // g_ba: predefined
+  Rigid3 base_from_camera;               // g_dc of a fixed camera
+  std::optional<PanTilt> pan_tilt;       // g_dc of a moving one; then base_from_camera is not used
+  std::optional<Rigid3> body_from_base;  // g_ed: predefined; absent: the flight's own T_BS
+  std::optional<Rigid3> world_from_pad;  // g_fb: predefined; absent: nothing to compare with
+  double time_offset = 0;                // camera clock minus navigation clock, s
+};
+
+// Reads the `frames` section and refuses unknown keys.
+FrameChain read_frame_chain(Section frames);
+
+// g_dc at these angles; a fixed camera's does not ask for them.
+Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>& angles);
+
+// What vision says: the pose of the body in the pad frame, with the covariance of the camera's pose. A missing
+// body_from_base counts as the identity.
+UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,
+                                        const std::optional<HeadAngles>& angles = {});
+
+// What navigation says; empty without world_from_pad.
+std::optional<Rigid3> pad_from_body_by_navigation(const FrameChain& chain, const Rigid3& world_from_body);
+
+// The moment of the navigation clock at which a frame was taken.
+inline int64_t navigation_time_ns(const FrameChain& chain, int64_t camera_time_ns) {
+  return camera_time_ns - static_cast<int64_t>(chain.time_offset * 1e9);
+}
+
+}  // namespace perch
