@@ -32,14 +32,24 @@ Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>
   return chain.pan_tilt->base_from_zero * Rigid3{pan * tilt, Eigen::Vector3d::Zero()};
 }
 
+namespace {
+
+Rigid3 camera_from_body(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
+  return inverse(chain.body_from_base.value_or(Rigid3{}) * base_from_camera(chain, angles));
+}
+
+}  // namespace
+
 UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,
                                         const std::optional<HeadAngles>& angles) {
-  const Rigid3 body_from_base = chain.body_from_base.value_or(Rigid3{});
-  const Rigid3 camera_from_base = inverse(base_from_camera(chain, angles));
-  const Rigid3 camera_from_body = camera_from_base * inverse(body_from_base);
-  const Rigid3 pad_from_target = inverse(chain.target_from_pad);
-  const UncertainRigid3 target_from_camera = inverse(camera_from_target);
-  return UncertainRigid3{pad_from_target} * target_from_camera * UncertainRigid3{camera_from_body};
+  return UncertainRigid3{inverse(chain.target_from_pad)} * inverse(camera_from_target) *
+         UncertainRigid3{camera_from_body(chain, angles)};
+}
+
+UncertainRigid3 camera_from_target_of(const FrameChain& chain, const UncertainRigid3& pad_from_body,
+                                      const std::optional<HeadAngles>& angles) {
+  return UncertainRigid3{camera_from_body(chain, angles)} * inverse(pad_from_body) *
+         UncertainRigid3{inverse(chain.target_from_pad)};
 }
 
 std::optional<Rigid3> pad_from_body_by_navigation(const FrameChain& chain, const Rigid3& world_from_body) {

@@ -46,6 +46,10 @@ Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>
 UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,
                                         const std::optional<HeadAngles>& angles = {});
 
+// The way back: where a body at this pose sees the target.
+UncertainRigid3 camera_from_target_of(const FrameChain& chain, const UncertainRigid3& pad_from_body,
+                                      const std::optional<HeadAngles>& angles = {});
+
 // What navigation says; empty without world_from_pad.
 std::optional<Rigid3> pad_from_body_by_navigation(const FrameChain& chain, const Rigid3& world_from_body);
 

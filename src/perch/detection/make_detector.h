@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+
+#include "perch/config/section.h"
+#include "perch/detection/detector.h"
+#include "perch/detection/squares_detector.h"
+#include "perch/target/landing_target.h"
+
+namespace perch {
+
+struct DetectionOptions {
+  PaperOptions paper;
+};
+
+// Reads the `detection` section and refuses unknown keys.
+DetectionOptions read_detection_options(Section detection);
+
+// The detector that the target asks for: squares by `detection.method`, tags by libapriltag. Throws
+// std::invalid_argument when the method cannot serve the target.
+std::unique_ptr<Detector> make_detector(const LandingTarget& target, const DetectionOptions& options);
+
+}  // namespace perch

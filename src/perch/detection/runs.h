@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace perch {
+
+// A binary picture as runs: each row is cut into pieces of alternating colour, which together cover it.
+//
+//   row:  ....####..##    runs: [0,4) black, [4,8) white, [8,10) black, [10,12) white
+struct Run {
+  int begin = 0, end = 0;  // columns, [begin, end)
+  int label = 0;           // the component it belongs to, once labelled
+};
+
+struct RunImage {
+  struct Row {
+    int first = 0;              // index of its first run
+    int count = 0;              // at least 1
+    bool first_white = false;   // colour of the first run
+  };
+  int width = 0;
+  std::vector<Row> rows;
+  std::vector<Run> runs;
+
+  bool is_white(const Row& row, int k) const { return row.first_white != ((k & 1) != 0); }
+};
+
+// Thresholds every `row_step`-th row of a grey picture (CV_8UC1, not empty): white where grey > level. Columns are
+// not skipped: a row costs the same bits however many of them are looked at. `image` keeps its memory.
+void threshold_to_runs(const cv::Mat& grey, uint8_t level, int row_step, RunImage& image);
+
+}  // namespace perch

@@ -1,0 +1,112 @@
+#include "perch/estimator/estimator.h"
+
+#include "perch/detection/stopwatch.h"
+
+namespace perch {
+namespace {
+
+EstimateStatus from_pose(PoseStatus status) {
+  switch (status) {
+    case PoseStatus::kOk:
+      return EstimateStatus::kOk;
+    case PoseStatus::kPartial:
+      return EstimateStatus::kPartial;
+    case PoseStatus::kAmbiguous:
+      return EstimateStatus::kAmbiguous;
+    case PoseStatus::kRejected:
+      break;
+  }
+  return EstimateStatus::kRejected;
+}
+
+// Why this frame cannot be estimated; empty when it can.
+std::string unreadable(const Frame& frame, const CameraModel& camera) {
+  if (!frame.problem.empty()) return frame.problem;
+  const auto size = [](int width, int height) { return std::to_string(width) + "x" + std::to_string(height); };
+  if (frame.grey.cols != camera.width() || frame.grey.rows != camera.height()) {
+    return frame.name + ": expected a picture of the camera model's " + size(camera.width(), camera.height()) +
+           " pixels, found " + size(frame.grey.cols, frame.grey.rows);
+  }
+  return {};
+}
+
+}  // namespace
+
+const char* to_string(EstimateStatus status) {
+  switch (status) {
+    case EstimateStatus::kOk:
+      return "ok";
+    case EstimateStatus::kNoTarget:
+      return "no_target";
+    case EstimateStatus::kPartial:
+      return "partial";
+    case EstimateStatus::kAmbiguous:
+      return "ambiguous";
+    case EstimateStatus::kRejected:
+      return "rejected";
+    case EstimateStatus::kUnreadable:
+      break;
+  }
+  return "unreadable";
+}
+
+Estimator::Estimator(const RunConfig& config, const CameraModel& camera)
+    : camera_(camera),
+      frames_(config.frames),
+      detector_(make_detector(config.target, config.detection)),
+      pose_(config.target, camera, config.pose),
+      filter_(config.tracking) {}
+
+std::optional<Prediction> Estimator::predict(int64_t timestamp_ns, const std::optional<HeadAngles>& angles) const {
+  const auto state = filter_.predict(timestamp_ns);
+  if (!state) return std::nullopt;
+  return Prediction{camera_from_target_of(
+      frames_, {state->pad_from_body, state->covariance.topLeftCorner<6, 6>()}, angles)};
+}
+
+void Estimator::estimate_pose(const Frame& frame, const std::optional<HeadAngles>& angles, Estimate& estimate) {
+  estimate.problem = unreadable(frame, camera_);
+  if (!estimate.problem.empty()) {
+    estimate.status = EstimateStatus::kUnreadable;
+    return;
+  }
+  Stopwatch stopwatch(estimate.stages);
+  const auto prediction = predict(frame.timestamp_ns, angles);
+  const Detection& detection = detector_->detect(frame.grey, prediction);
+  estimate.detect_us = stopwatch.since_lap_us();
+  estimate.stages = detection.stages;
+  estimate.correspondences = detection.correspondences;
+  estimate.features = static_cast<int>(detection.correspondences.size());
+  if (detection.status != DetectionStatus::kFound) {
+    estimate.status = detection.status == DetectionStatus::kPartial ? EstimateStatus::kPartial
+                                                                    : EstimateStatus::kNoTarget;
+    return;
+  }
+  stopwatch.restart();
+  const PoseResult pose = pose_.estimate(detection.correspondences, prediction);
+  stopwatch.lap("pose");
+  estimate.pose_us = estimate.stages.back().us;
+  estimate.status = from_pose(pose.status);
+  estimate.reprojection_rms_px = pose.reprojection_rms_px;
+  estimate.ambiguity = pose.ambiguity;
+  estimate.features = pose.features;
+  if (estimate.status != EstimateStatus::kOk) return;
+  estimate.camera_from_target = pose.camera_from_target;
+  estimate.pad_from_body = pad_from_body_by_vision(frames_, pose.camera_from_target, angles);
+  stopwatch.lap("frames");
+}
+
+Estimate Estimator::process(const Frame& frame, const std::optional<HeadAngles>& angles) {
+  Estimate estimate;
+  estimate.timestamp_ns = frame.timestamp_ns;
+  std::vector<StageTime> total;
+  Stopwatch whole(total);
+  estimate_pose(frame, angles, estimate);
+  Stopwatch stopwatch(estimate.stages);
+  estimate.state = filter_.update(frame.timestamp_ns, estimate.pad_from_body);
+  stopwatch.lap("tracking");
+  estimate.total_us = whole.since_lap_us();
+  return estimate;
+}
+
+}  // namespace perch

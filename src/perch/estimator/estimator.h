@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "perch/camera/camera_model.h"
+#include "perch/camera/image_source.h"
+#include "perch/estimator/estimate.h"
+#include "perch/estimator/run_config.h"
+
+namespace perch {
+
+// The way a picture takes, and nothing else:
+//
+//   Frame --detection--> Correspondences --pose--> camera_from_target --frames--> pad_from_body --tracking--> state
+//
+// One frame in, one result out, in the order of the frames. Deterministic: the same frames give the same results,
+// bit for bit but for the measured times. One Estimator serves one thread and allocates its buffers once.
+class Estimator {
+ public:
+  // Throws std::invalid_argument when the configured method cannot serve the target.
+  Estimator(const RunConfig& config, const CameraModel& camera);
+
+  // `angles`: those of the pan/tilt head at the frame's time.
+  Estimate process(const Frame& frame, const std::optional<HeadAngles>& angles = {});
+
+  const FrameChain& frames() const { return frames_; }
+
+ private:
+  void estimate_pose(const Frame& frame, const std::optional<HeadAngles>& angles, Estimate& estimate);
+  std::optional<Prediction> predict(int64_t timestamp_ns, const std::optional<HeadAngles>& angles) const;
+
+  CameraModel camera_;
+  FrameChain frames_;
+  std::unique_ptr<Detector> detector_;
+  PoseEstimator pose_;
+  VehicleFilter filter_;
+};
+
+}  // namespace perch

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "perch/camera/image_source.h"
+#include "perch/config/section.h"
+#include "perch/detection/make_detector.h"
+#include "perch/frames/frame_chain.h"
+#include "perch/pose/pose_estimator.h"
+#include "perch/target/landing_target.h"
+#include "perch/tracking/filter.h"
+
+namespace perch {
+
+// The one YAML file of a run, live or batch (docs/FORMATS.md, Configuration).
+struct RunConfig {
+  LandingTarget target;
+  std::string source;                   // camera.source; empty: the program's own argument says
+  std::filesystem::path camera_model;   // camera.model; empty: the flight's own
+  Channel channel = Channel::kGrey;
+  FrameChain frames;
+  DetectionOptions detection;
+  PoseOptions pose;
+  TrackingOptions tracking;
+};
+
+// Reads the whole document. Throws ConfigError for anything that is not as it should be; nothing starts then.
+RunConfig read_run_config(Section root);
+
+}  // namespace perch
