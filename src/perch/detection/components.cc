@@ -57,7 +57,8 @@ void label_components(RunImage& image, Components& components) {
       const bool white = image.is_white(row, k);
       int label = kNone;
       if (y > 0) {
-        // The rows are wholly covered, so the run above that holds our first column is where the last run left off.
+        // The rows are wholly covered, so the run above that holds our first column is where the last run
+        // left off.
         while (true) {
           if (image.is_white(above_row, k_above) == white) label = join(list, label, above[k_above].label);
           if (above[k_above].end >= run.end) break;

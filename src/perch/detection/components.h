@@ -9,8 +9,8 @@ namespace perch {
 // The paper's section 2.1.2: regions of equal colour by 4-connectivity, here of runs (Rosenfeld's two-pass
 // labelling with a union-find), black and white in one pass.
 struct Component {
-  int parent = 0;  // itself when it is a root
-  int area = 0;    // pixels of the sampled rows
+  int parent = 0;                                // itself when it is a root
+  int area = 0;                                  // pixels of the sampled rows
   int left = 0, top = 0, right = 0, bottom = 0;  // bounding box, inclusive; rows as in RunImage::rows
   bool white = false;
 };

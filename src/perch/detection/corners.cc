@@ -8,8 +8,8 @@ namespace {
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// How far outside the triangle, measured from its nearest side's line; negative inside. The triangle is ordered so
-// that each side has the third corner on its positive side.
+// How far outside the triangle, measured from its nearest side's line; negative inside. The triangle is
+// ordered so that each side has the third corner on its positive side.
 double outside(const std::array<Eigen::Vector2d, 3>& triangle, const Eigen::Vector2d& p) {
   double farthest = -1;
   for (size_t i = 0; i < 3; ++i) {

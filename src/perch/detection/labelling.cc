@@ -11,8 +11,8 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-// Vectors closer in direction than this are one ray: `sharp` has none other closer than 0.2 at its squares, and half
-// a pixel of error in a centre 8 px away turns it by 0.06.
+// Vectors closer in direction than this are one ray: `sharp` has none other closer than 0.2 at its squares,
+// and half a pixel of error in a centre 8 px away turns it by 0.06.
 constexpr double kSameRay = 0.1;  // rad
 
 double angle_of(const Eigen::Vector2d& v) { return std::atan2(v.y(), v.x()); }
@@ -23,7 +23,8 @@ double turn(double a, double b) {
   return t < 0 ? t + 2 * M_PI : t;
 }
 
-// How far the best two disjoint pairs of vectors from `from` are off being collinear: the larger sine of the two.
+// How far the best two disjoint pairs of vectors from `from` are off being collinear: the larger sine of the
+// two.
 double two_pairs_off_line(const Points& centres, size_t from) {
   const size_t n = centres.size();
   const auto off = [&](size_t i, size_t j) {
@@ -61,7 +62,8 @@ size_t anchor_of(const Points& centres) {
   return anchor;
 }
 
-// The others around `anchor`, counterclockwise from the widest gap between them; on one ray the nearest first.
+// The others around `anchor`, counterclockwise from the widest gap between them; on one ray the nearest
+// first.
 std::vector<int> order_around(const Points& centres, size_t anchor) {
   std::vector<std::pair<double, int>> angles;
   for (size_t i = 0; i < centres.size(); ++i) {
@@ -122,10 +124,12 @@ Eigen::Vector2d turned_over(const Eigen::Vector2d& pixel) { return {pixel.x(), -
 
 std::optional<Labelling> Labelling::of(const SquaresLayout& layout) {
   Points centres;
-  for (const auto& s : layout.squares) centres.push_back(s.lower_left + Eigen::Vector2d::Constant(s.side / 2));
+  for (const auto& s : layout.squares)
+    centres.push_back(s.lower_left + Eigen::Vector2d::Constant(s.side / 2));
   if (centres.size() < 5) return std::nullopt;
   const size_t anchor = anchor_of(centres);
-  // The drawing is exact: what is collinear is so to rounding, what is not differs by more than what is seen can hide.
+  // The drawing is exact: what is collinear is so to rounding, what is not differs by more than what is seen
+  // can hide.
   if (two_pairs_off_line(centres, anchor) > 1e-9) return std::nullopt;
   for (size_t i = 0; i < centres.size(); ++i) {
     if (i != anchor && two_pairs_off_line(centres, i) < kSameRay) return std::nullopt;
@@ -143,7 +147,8 @@ std::optional<Labelling> Labelling::of(const SquaresLayout& layout) {
     size_t best = i == 0 ? 1 : 0;
     for (size_t k = 0; k < centres.size(); ++k) {
       if (k == i) continue;
-      if (least_margin(corners, centres[i], centres[k]) > least_margin(corners, centres[i], centres[best])) best = k;
+      if (least_margin(corners, centres[i], centres[k]) > least_margin(corners, centres[i], centres[best]))
+        best = k;
     }
     labelling.corner_rules_.push_back(
         {static_cast<int>(best), static_cast<int>(first_corner(corners, centres[i], centres[best]))});

@@ -22,15 +22,15 @@ struct SeenSquare {
 // counterclockwise by angle, collinear ones by distance. In each square, one corner comes first
 // counterclockwise from the direction to another square; the rest follow it.
 //
-// What is peculiar to `sharp` (which square, which order) is read off the layout, so that every layout with such an
-// anchor, seen by all others within half a turn, can be labelled.
+// What is peculiar to `sharp` (which square, which order) is read off the layout, so that every layout with
+// such an anchor, seen by all others within half a turn, can be labelled.
 class Labelling {
  public:
   // Empty when the layout has no such anchor.
   static std::optional<Labelling> of(const SquaresLayout& layout);
 
-  // The seen squares in the layout's order, each with its corners in the order of its features. Empty when their
-  // number is wrong or no square, or more than one, can be the anchor.
+  // The seen squares in the layout's order, each with its corners in the order of its features. Empty when
+  // their number is wrong or no square, or more than one, can be the anchor.
   std::optional<std::vector<SeenSquare>> label(std::span<const SeenSquare> seen) const;
 
  private:
@@ -39,8 +39,8 @@ class Labelling {
     int first = 0;    // the feature (0..3) that comes first counterclockwise from it
   };
   int anchor_ = 0;
-  std::vector<int> order_;               // the other squares as they come around the anchor
-  std::vector<CornerRule> corner_rules_; // by square
+  std::vector<int> order_;                // the other squares as they come around the anchor
+  std::vector<CornerRule> corner_rules_;  // by square
 };
 
 }  // namespace perch

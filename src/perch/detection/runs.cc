@@ -37,8 +37,8 @@ void threshold_to_runs(const cv::Mat& grey, uint8_t level, int row_step, RunImag
     int begin = 0;
     for (int x = 0; x < grey.cols; x += 64) {
       const int count = grey.cols - x;
-      const uint64_t bits = count >= 64 ? white_bits_64(pixels + x, levels)
-                                        : white_bits_tail(pixels + x, count, level);
+      const uint64_t bits =
+          count >= 64 ? white_bits_64(pixels + x, levels) : white_bits_tail(pixels + x, count, level);
       uint64_t changes = bits ^ ((bits << 1) | before);
       if (count < 64) changes &= (uint64_t{1} << count) - 1;
       for (; changes != 0; changes &= changes - 1) {

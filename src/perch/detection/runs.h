@@ -16,9 +16,9 @@ struct Run {
 
 struct RunImage {
   struct Row {
-    int first = 0;              // index of its first run
-    int count = 0;              // at least 1
-    bool first_white = false;   // colour of the first run
+    int first = 0;             // index of its first run
+    int count = 0;             // at least 1
+    bool first_white = false;  // colour of the first run
   };
   int width = 0;
   std::vector<Row> rows;
@@ -27,8 +27,9 @@ struct RunImage {
   bool is_white(const Row& row, int k) const { return row.first_white != ((k & 1) != 0); }
 };
 
-// Thresholds every `row_step`-th row of a grey picture (CV_8UC1, not empty): white where grey > level. Columns are
-// not skipped: a row costs the same bits however many of them are looked at. `image` keeps its memory.
+// Thresholds every `row_step`-th row of a grey picture (CV_8UC1, not empty): white where grey > level.
+// Columns are not skipped: a row costs the same bits however many of them are looked at. `image` keeps its
+// memory.
 void threshold_to_runs(const cv::Mat& grey, uint8_t level, int row_step, RunImage& image);
 
 }  // namespace perch

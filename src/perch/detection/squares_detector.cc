@@ -46,9 +46,9 @@ struct SquaresDetector::Work {
 
   RunImage image, foreground, window;
   Components components, regions, window_components;
-  std::vector<Region> contents;       // by label of `regions`
-  std::vector<int> region_of;         // by label of `components`
-  std::vector<int> squares;           // labels of the candidate's squares
+  std::vector<Region> contents;  // by label of `regions`
+  std::vector<int> region_of;    // by label of `components`
+  std::vector<int> squares;      // labels of the candidate's squares
   std::vector<SeenSquare> seen;
   std::vector<Eigen::Vector2d> outline;
 
@@ -64,8 +64,10 @@ SquaresDetector::SquaresDetector(const LandingTarget& target, const PaperOptions
   auto labelling = Labelling::of(*layout);
   if (!labelling) {
     throw std::invalid_argument(
-        "detection.method paper: expected a layout with one square from which two pairs of others lie in line, "
-        "as from D of sharp; " + target.name + " has none");
+        "detection.method paper: expected a layout with one square from which two pairs of others lie in "
+        "line, "
+        "as from D of sharp; " +
+        target.name + " has none");
   }
   work_ = std::make_unique<Work>();
   work_->layout = *layout;
@@ -110,7 +112,8 @@ bool SquaresDetector::Work::find_squares(int region) {
   for (size_t i = 1; i < components.list.size(); ++i) {
     const int label = static_cast<int>(i);
     const Component& c = components.list[i];
-    if (region_of[i] != region || !components.is_root(label) || !c.white || c.area < options.min_component_px) continue;
+    if (region_of[i] != region || !components.is_root(label) || !c.white || c.area < options.min_component_px)
+      continue;
     squares.push_back(label);
     if (border == Components::kFrame || contains(c, at(border))) border = label;
   }
@@ -130,8 +133,10 @@ bool SquaresDetector::Work::find_squares(int region) {
 std::optional<SeenSquare> SquaresDetector::Work::measure(const cv::Mat& grey, uint8_t level,
                                                          const Component& square) {
   const int step = options.segmentation_row_step;
-  // The rows that were skipped may belong to the square; and a pixel of margin, so that it ends inside the window.
-  const cv::Rect wanted(square.left - step, square.top * step - step, square.right - square.left + 1 + 2 * step,
+  // The rows that were skipped may belong to the square; and a pixel of margin, so that it ends inside the
+  // window.
+  const cv::Rect wanted(square.left - step, square.top * step - step,
+                        square.right - square.left + 1 + 2 * step,
                         (square.bottom - square.top) * step + 1 + 2 * step);
   const cv::Rect box = wanted & cv::Rect(0, 0, grey.cols, grey.rows);
   threshold_to_runs(grey(box), level, 1, window);
@@ -141,7 +146,8 @@ std::optional<SeenSquare> SquaresDetector::Work::measure(const cv::Mat& grey, ui
   int best = Components::kFrame;
   for (size_t i = 1; i < list.size(); ++i) {
     if (!window_components.is_root(static_cast<int>(i)) || !list[i].white) continue;
-    if (best == Components::kFrame || list[i].area > list[static_cast<size_t>(best)].area) best = static_cast<int>(i);
+    if (best == Components::kFrame || list[i].area > list[static_cast<size_t>(best)].area)
+      best = static_cast<int>(i);
   }
   if (best == Components::kFrame) return std::nullopt;
 

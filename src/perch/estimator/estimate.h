@@ -22,12 +22,12 @@ struct Estimate {
   EstimateStatus status = EstimateStatus::kNoTarget;
   UncertainRigid3 camera_from_target;  // with kOk only
   double reprojection_rms_px = 0;
-  int features = 0;                    // how many correspondences the pose rests on
-  double ambiguity = 0;                // 0: no doubt, 1: undecidable
+  int features = 0;      // how many correspondences the pose rests on
+  double ambiguity = 0;  // 0: no doubt, 1: undecidable
   double detect_us = 0, pose_us = 0, total_us = 0;
-  std::vector<StageTime> stages;       // every step, in order, also those inside `detect_us` and `pose_us`
+  std::vector<StageTime> stages;  // every step, in order, also those inside `detect_us` and `pose_us`
   std::vector<Correspondence> correspondences;
-  std::string problem;                 // with kUnreadable: "place: cause"
+  std::string problem;                           // with kUnreadable: "place: cause"
   std::optional<UncertainRigid3> pad_from_body;  // with kOk, through the frame chain
   std::optional<VehicleState> state;             // from the first detection on
 };

@@ -1,6 +1,9 @@
 #include "perch/estimator/estimator.h"
 
+#include <cmath>
+
 #include "perch/detection/stopwatch.h"
+#include "perch/geometry/euler.h"
 
 namespace perch {
 namespace {
@@ -22,12 +25,23 @@ EstimateStatus from_pose(PoseStatus status) {
 // Why this frame cannot be estimated; empty when it can.
 std::string unreadable(const Frame& frame, const CameraModel& camera) {
   if (!frame.problem.empty()) return frame.problem;
-  const auto size = [](int width, int height) { return std::to_string(width) + "x" + std::to_string(height); };
+  const auto size = [](int width, int height) {
+    return std::to_string(width) + "x" + std::to_string(height);
+  };
   if (frame.grey.cols != camera.width() || frame.grey.rows != camera.height()) {
-    return frame.name + ": expected a picture of the camera model's " + size(camera.width(), camera.height()) +
-           " pixels, found " + size(frame.grey.cols, frame.grey.rows);
+    return frame.name + ": expected a picture of the camera model's " +
+           size(camera.width(), camera.height()) + " pixels, found " + size(frame.grey.cols, frame.grey.rows);
   }
   return {};
+}
+
+// The normal that the poses before lead to expect. The covariance of a chain of poses does not know that an
+// earlier one may have been the wrong minimum: five degrees more keep it from outvoting gravity.
+NormalHint from_prediction(const Prediction& prediction) {
+  const auto& [mean, covariance] = prediction.camera_from_target;
+  const double floor = 5 * kRadFromDeg;
+  const double variance = covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff();
+  return {mean.rotation * Eigen::Vector3d::UnitZ(), std::sqrt(variance + floor * floor)};
 }
 
 }  // namespace
@@ -53,37 +67,45 @@ const char* to_string(EstimateStatus status) {
 Estimator::Estimator(const RunConfig& config, const CameraModel& camera)
     : camera_(camera),
       frames_(config.frames),
+      gravity_sigma_(config.pose.gravity_sigma_deg * kRadFromDeg),
       detector_(make_detector(config.target, config.detection)),
       pose_(config.target, camera, config.pose),
       filter_(config.tracking) {}
 
-std::optional<Prediction> Estimator::predict(int64_t timestamp_ns, const std::optional<HeadAngles>& angles) const {
+std::optional<Prediction> Estimator::predict(int64_t timestamp_ns,
+                                             const std::optional<HeadAngles>& angles) const {
   const auto state = filter_.predict(timestamp_ns);
   if (!state) return std::nullopt;
   return Prediction{camera_from_target_of(
       frames_, {state->pad_from_body, state->covariance.topLeftCorner<6, 6>()}, angles)};
 }
 
-void Estimator::estimate_pose(const Frame& frame, const std::optional<HeadAngles>& angles, Estimate& estimate) {
+void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& estimate) {
   estimate.problem = unreadable(frame, camera_);
   if (!estimate.problem.empty()) {
     estimate.status = EstimateStatus::kUnreadable;
     return;
   }
   Stopwatch stopwatch(estimate.stages);
-  const auto prediction = predict(frame.timestamp_ns, angles);
+  const auto prediction = predict(frame.timestamp_ns, aid.angles);
   const Detection& detection = detector_->detect(frame.grey, prediction);
   estimate.detect_us = stopwatch.since_lap_us();
   estimate.stages = detection.stages;
   estimate.correspondences = detection.correspondences;
   estimate.features = static_cast<int>(detection.correspondences.size());
   if (detection.status != DetectionStatus::kFound) {
-    estimate.status = detection.status == DetectionStatus::kPartial ? EstimateStatus::kPartial
-                                                                    : EstimateStatus::kNoTarget;
+    estimate.status =
+        detection.status == DetectionStatus::kPartial ? EstimateStatus::kPartial : EstimateStatus::kNoTarget;
     return;
   }
   stopwatch.restart();
-  const PoseResult pose = pose_.estimate(detection.correspondences, prediction);
+  std::vector<NormalHint> hints;
+  if (prediction) hints.push_back(from_prediction(*prediction));
+  if (aid.world_from_body) {
+    const auto normal = level_normal_in_camera(frames_, *aid.world_from_body, aid.angles);
+    if (normal) hints.push_back({*normal, gravity_sigma_});
+  }
+  const PoseResult pose = pose_.estimate(detection.correspondences, hints);
   stopwatch.lap("pose");
   estimate.pose_us = estimate.stages.back().us;
   estimate.status = from_pose(pose.status);
@@ -92,16 +114,16 @@ void Estimator::estimate_pose(const Frame& frame, const std::optional<HeadAngles
   estimate.features = pose.features;
   if (estimate.status != EstimateStatus::kOk) return;
   estimate.camera_from_target = pose.camera_from_target;
-  estimate.pad_from_body = pad_from_body_by_vision(frames_, pose.camera_from_target, angles);
+  estimate.pad_from_body = pad_from_body_by_vision(frames_, pose.camera_from_target, aid.angles);
   stopwatch.lap("frames");
 }
 
-Estimate Estimator::process(const Frame& frame, const std::optional<HeadAngles>& angles) {
+Estimate Estimator::process(const Frame& frame, const Aid& aid) {
   Estimate estimate;
   estimate.timestamp_ns = frame.timestamp_ns;
   std::vector<StageTime> total;
   Stopwatch whole(total);
-  estimate_pose(frame, angles, estimate);
+  estimate_pose(frame, aid, estimate);
   Stopwatch stopwatch(estimate.stages);
   estimate.state = filter_.update(frame.timestamp_ns, estimate.pad_from_body);
   stopwatch.lap("tracking");

@@ -12,26 +12,32 @@ namespace perch {
 
 // The way a picture takes, and nothing else:
 //
-//   Frame --detection--> Correspondences --pose--> camera_from_target --frames--> pad_from_body --tracking--> state
+//   Frame --detection--> Correspondences --pose--> camera_from_target --frames--> pad_from_body --tracking-->
+//   state
 //
-// One frame in, one result out, in the order of the frames. Deterministic: the same frames give the same results,
-// bit for bit but for the measured times. One Estimator serves one thread and allocates its buffers once.
+// One frame in, one result out, in the order of the frames. Deterministic: the same frames give the same
+// results, bit for bit but for the measured times. One Estimator serves one thread and allocates its buffers
+// once.
 class Estimator {
  public:
   // Throws std::invalid_argument when the configured method cannot serve the target.
   Estimator(const RunConfig& config, const CameraModel& camera);
 
-  // `angles`: those of the pan/tilt head at the frame's time.
-  Estimate process(const Frame& frame, const std::optional<HeadAngles>& angles = {});
-
-  const FrameChain& frames() const { return frames_; }
+  // What is known besides the picture at the frame's time: the angles of the pan/tilt head, and the attitude
+  // (the rotation of world_from_body), by which gravity decides what the picture of a plane cannot.
+  struct Aid {
+    std::optional<HeadAngles> angles;
+    std::optional<Eigen::Quaterniond> world_from_body;
+  };
+  Estimate process(const Frame& frame, const Aid& aid = {});
 
  private:
-  void estimate_pose(const Frame& frame, const std::optional<HeadAngles>& angles, Estimate& estimate);
+  void estimate_pose(const Frame& frame, const Aid& aid, Estimate& estimate);
   std::optional<Prediction> predict(int64_t timestamp_ns, const std::optional<HeadAngles>& angles) const;
 
   CameraModel camera_;
   FrameChain frames_;
+  double gravity_sigma_;  // rad
   std::unique_ptr<Detector> detector_;
   PoseEstimator pose_;
   VehicleFilter filter_;

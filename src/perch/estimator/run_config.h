@@ -16,8 +16,8 @@ namespace perch {
 // The one YAML file of a run, live or batch (docs/FORMATS.md, Configuration).
 struct RunConfig {
   LandingTarget target;
-  std::string source;                   // camera.source; empty: the program's own argument says
-  std::filesystem::path camera_model;   // camera.model; empty: the flight's own
+  std::string source;                  // camera.source; empty: the program's own argument says
+  std::filesystem::path camera_model;  // camera.model; empty: the flight's own
   Channel channel = Channel::kGrey;
   FrameChain frames;
   DetectionOptions detection;

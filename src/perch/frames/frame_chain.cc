@@ -1,5 +1,9 @@
 #include "perch/frames/frame_chain.h"
 
+#include <cmath>
+
+#include "perch/geometry/euler.h"
+
 namespace perch {
 
 FrameChain read_frame_chain(Section frames) {
@@ -50,6 +54,22 @@ UncertainRigid3 camera_from_target_of(const FrameChain& chain, const UncertainRi
                                       const std::optional<HeadAngles>& angles) {
   return UncertainRigid3{camera_from_body(chain, angles)} * inverse(pad_from_body) *
          UncertainRigid3{inverse(chain.target_from_pad)};
+}
+
+std::optional<Eigen::Vector3d> level_normal_in_camera(const FrameChain& chain,
+                                                      const Eigen::Quaterniond& world_from_body,
+                                                      const std::optional<HeadAngles>& angles) {
+  const Eigen::Quaterniond camera_from_world =
+      camera_from_body(chain, angles).rotation * world_from_body.conjugate();
+  if (chain.world_from_pad) {
+    const Eigen::Quaterniond world_from_target =
+        chain.world_from_pad->rotation * chain.target_from_pad.rotation.conjugate();
+    return camera_from_world * (world_from_target * Eigen::Vector3d::UnitZ());
+  }
+  const Eigen::Vector3d vertical = camera_from_world * Eigen::Vector3d::UnitZ();
+  // 20 degrees: a target in the picture lies up to that far beside the axis of most lenses.
+  if (std::abs(vertical.z()) < std::sin(20 * kRadFromDeg)) return std::nullopt;
+  return vertical.z() < 0 ? vertical : Eigen::Vector3d(-vertical);
 }
 
 std::optional<Rigid3> pad_from_body_by_navigation(const FrameChain& chain, const Rigid3& world_from_body) {

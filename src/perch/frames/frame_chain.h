@@ -7,10 +7,10 @@
 
 namespace perch {
 
-// A pan/tilt head between the base and the camera. At zero angles the camera sits at base_from_zero; the tilt axis
-// moves with the pan. Positive pan turns the camera right (the target moves left in the picture), positive tilt
-// turns it up (the target moves down): the paper's section 3.2, with the base's axes those of a camera
-// (x right, y down, z forward) and the optical centre on both axes.
+// A pan/tilt head between the base and the camera. At zero angles the camera sits at base_from_zero; the tilt
+// axis moves with the pan. Positive pan turns the camera right (the target moves left in the picture),
+// positive tilt turns it up (the target moves down): the paper's section 3.2, with the base's axes those of a
+// camera (x right, y down, z forward) and the optical centre on both axes.
 struct PanTilt {
   Rigid3 base_from_zero;
 };
@@ -41,14 +41,22 @@ FrameChain read_frame_chain(Section frames);
 // g_dc at these angles; a fixed camera's does not ask for them.
 Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>& angles);
 
-// What vision says: the pose of the body in the pad frame, with the covariance of the camera's pose. A missing
-// body_from_base counts as the identity.
+// What vision says: the pose of the body in the pad frame, with the covariance of the camera's pose. A
+// missing body_from_base counts as the identity.
 UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,
                                         const std::optional<HeadAngles>& angles = {});
 
 // The way back: where a body at this pose sees the target.
 UncertainRigid3 camera_from_target_of(const FrameChain& chain, const UncertainRigid3& pad_from_body,
                                       const std::optional<HeadAngles>& angles = {});
+
+// Where the face of a level target points, seen by the camera at this attitude (the rotation of
+// world_from_body). With world_from_pad the face's own normal; without it the pad is taken as level in a
+// world whose z is up or down. Then it is empty when the camera looks too near the horizon to tell the face
+// from its back.
+std::optional<Eigen::Vector3d> level_normal_in_camera(const FrameChain& chain,
+                                                      const Eigen::Quaterniond& world_from_body,
+                                                      const std::optional<HeadAngles>& angles = {});
 
 // What navigation says; empty without world_from_pad.
 std::optional<Rigid3> pad_from_body_by_navigation(const FrameChain& chain, const Rigid3& world_from_body);

@@ -8,7 +8,8 @@
 namespace perch {
 namespace {
 
-// Moves the points' centroid to the origin and their mean square distance from it to 2: p -> scale (p - centre).
+// Moves the points' centroid to the origin and their mean square distance from it to 2: p -> scale (p -
+// centre).
 struct Conditioner {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double scale = 0;
@@ -22,7 +23,8 @@ struct Conditioner {
   }
   Eigen::Vector2d operator()(const Eigen::Vector2d& p) const { return scale * (p - centre); }
   Eigen::Matrix3d matrix() const {
-    return (Eigen::Matrix3d() << scale, 0, -scale * centre.x(), 0, scale, -scale * centre.y(), 0, 0, 1).finished();
+    return (Eigen::Matrix3d() << scale, 0, -scale * centre.x(), 0, scale, -scale * centre.y(), 0, 0, 1)
+        .finished();
   }
   Eigen::Matrix3d inverse() const {
     return (Eigen::Matrix3d() << 1 / scale, 0, centre.x(), 0, 1 / scale, centre.y(), 0, 0, 1).finished();
@@ -31,7 +33,8 @@ struct Conditioner {
 
 }  // namespace
 
-std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane, std::span<const Eigen::Vector2d> image) {
+std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane,
+                                  std::span<const Eigen::Vector2d> image) {
   if (plane.size() != image.size() || plane.size() < 4) return std::nullopt;
   const Conditioner on_plane(plane), in_image(image);
   if (!std::isfinite(on_plane.scale) || !std::isfinite(in_image.scale)) return std::nullopt;
@@ -68,8 +71,8 @@ std::optional<Rigid3> pose_from_homography(const Eigen::Matrix3d& homography) {
   const Eigen::Matrix3d H = homography(2, 2) < 0 ? Eigen::Matrix3d(-homography) : homography;
   const double scale = 2 / (H.col(0).norm() + H.col(1).norm());
   if (!std::isfinite(scale)) return std::nullopt;
-  // The orthonormal pair nearest to [r1 r2] is A (A'A)^-1/2, the paper's U V' of its SVD; of a 2x2 matrix M the root
-  // is (M + sqrt(det M) I) / sqrt(trace M + 2 sqrt(det M)).
+  // The orthonormal pair nearest to [r1 r2] is A (A'A)^-1/2, the paper's U V' of its SVD; of a 2x2 matrix M
+  // the root is (M + sqrt(det M) I) / sqrt(trace M + 2 sqrt(det M)).
   const Eigen::Matrix<double, 3, 2> A = scale * H.leftCols<2>();
   const Eigen::Matrix2d M = A.transpose() * A;
   const double root_det = std::sqrt(std::max(0.0, M.determinant()));

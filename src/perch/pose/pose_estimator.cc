@@ -2,19 +2,25 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
 
+#include "perch/geometry/euler.h"
 #include "perch/pose/linear_seed.h"
 #include "perch/pose/planar_ambiguity.h"
 
 namespace perch {
 namespace {
 
-// How much the stated sigmas count against the residuals when the noise is estimated, in degrees of freedom: four
-// corners leave two residuals to spare, whose mean square alone would be worthless.
+// How much the stated sigmas count against the residuals when the noise is estimated, in degrees of freedom:
+// four corners leave two residuals to spare, whose mean square alone would be worthless.
 constexpr double kPriorFreedom = 8;
 
 // Minima whose rotations are closer than this are one: the refinement stops a thousand times nearer.
 constexpr double kSameMinimum = 1e-4;  // rad
+
+bool faces_camera(const Rigid3& camera_from_target) {
+  return (camera_from_target.rotation * Eigen::Vector3d::UnitZ()).dot(camera_from_target.translation) < 0;
+}
 
 }  // namespace
 
@@ -23,12 +29,15 @@ PoseOptions read_pose_options(Section pose) {
   pose.read("max_rms_sigmas", o.max_rms_sigmas, kPositive);
   pose.read("huber_sigmas", o.huber_sigmas, kPositive);
   pose.read("min_evidence", o.min_evidence, kNotNegative);
+  pose.read("gravity_sigma_deg", o.gravity_sigma_deg, kPositive);
+  pose.read("same_minimum_deg", o.same_minimum_deg, kNotNegative);
   pose.read("max_iterations", o.max_iterations, Range{1, 1000});
   pose.done();
   return o;
 }
 
-PoseEstimator::PoseEstimator(const LandingTarget& target, const CameraModel& camera, const PoseOptions& options)
+PoseEstimator::PoseEstimator(const LandingTarget& target, const CameraModel& camera,
+                             const PoseOptions& options)
     : camera_(camera), options_(options) {
   for (const auto& feature : target.features) features_.push_back(feature.point);
   solver_.options.max_num_iterations = options.max_iterations;
@@ -49,8 +58,8 @@ PoseEstimator::Minimum PoseEstimator::refine(const Rigid3& start) {
   minimum.camera_from_target = cost.pose(x);
   minimum.camera_from_target.rotation.normalize();
   minimum.cost = 2 * summary.final_cost;
-  minimum.converged = std::isfinite(minimum.cost) && x.allFinite() &&
-                      summary.status != decltype(solver_)::HIT_MAX_ITERATIONS;
+  minimum.converged =
+      std::isfinite(minimum.cost) && x.allFinite() && summary.status != decltype(solver_)::HIT_MAX_ITERATIONS;
   return minimum;
 }
 
@@ -76,10 +85,7 @@ UncertainRigid3 PoseEstimator::with_covariance(const Minimum& minimum) const {
   return result;
 }
 
-PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondences,
-                                   const std::optional<Prediction>& prediction) {
-  PoseResult result;
-  result.features = static_cast<int>(correspondences.size());
+void PoseEstimator::observe(std::span<const Correspondence> correspondences) {
   observations_.clear();
   plane_.clear();
   image_.clear();
@@ -91,6 +97,38 @@ PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondenc
     plane_.push_back(point);
     image_.push_back(ray->hnormalized());
   }
+}
+
+PoseEstimator::Residuals PoseEstimator::residuals_at(const Rigid3& camera_from_target) const {
+  double squares_px = 0;
+  double squares = 0;
+  for (const auto& o : observations_) {
+    Eigen::Vector2d error = Eigen::Vector2d::Zero();
+    whitened_error(camera_, camera_from_target, o, &error, nullptr);
+    squares += error.squaredNorm();
+    squares_px += (o.sigma_px * error).squaredNorm();
+  }
+  const double n = static_cast<double>(observations_.size());
+  return {std::sqrt(squares_px / n), std::sqrt(squares / n)};
+}
+
+double PoseEstimator::chi_square(const Minimum& minimum, double noise,
+                                 std::span<const NormalHint> hints) const {
+  double sum = minimum.cost / noise;
+  const Eigen::Vector3d normal = minimum.camera_from_target.rotation * Eigen::Vector3d::UnitZ();
+  for (const auto& hint : hints) {
+    const double angle =
+        std::atan2(normal.cross(hint.normal_in_camera).norm(), normal.dot(hint.normal_in_camera));
+    sum += angle * angle / (hint.sigma * hint.sigma);
+  }
+  return sum;
+}
+
+PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondences,
+                                   std::span<const NormalHint> hints) {
+  PoseResult result;
+  observe(correspondences);
+  result.features = static_cast<int>(observations_.size());
   if (observations_.size() < 4) {
     result.status = PoseStatus::kPartial;
     return result;
@@ -101,43 +139,31 @@ PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondenc
   if (!best.converged) return result;
   Minimum second = refine(mirrored_pose(best.camera_from_target));
   const double apart = second.camera_from_target.rotation.angularDistance(best.camera_from_target.rotation);
-  const bool in_front =
-      (second.camera_from_target.rotation * Eigen::Vector3d::UnitZ()).dot(second.camera_from_target.translation) < 0;
-  const bool two = second.converged && apart > kSameMinimum && in_front;
-  if (two && second.cost < best.cost) std::swap(best, second);
-
-  const double noise = noise_variance(best.cost);
-  double squares_px = 0;
-  double squares = 0;
-  for (const auto& o : observations_) {
-    Eigen::Vector2d error = Eigen::Vector2d::Zero();
-    whitened_error(camera_, best.camera_from_target, o, &error, nullptr);
-    squares += error.squaredNorm();
-    squares_px += (o.sigma_px * error).squaredNorm();
-  }
-  const double n = static_cast<double>(observations_.size());
-  result.reprojection_rms_px = std::sqrt(squares_px / n);
-  result.features = static_cast<int>(observations_.size());
-  // Not "greater than": a NaN is refused too.
-  if (!(std::sqrt(squares / n) <= options_.max_rms_sigmas)) return result;
-
-  bool decided = true;
+  const bool two = second.converged && apart > kSameMinimum && faces_camera(second.camera_from_target);
+  const double noise = noise_variance(two ? std::min(best.cost, second.cost) : best.cost);
+  double evidence = std::numeric_limits<double>::infinity();
   if (two) {
-    result.ambiguity = second.cost > 0 ? best.cost / second.cost : 1;
-    decided = second.cost - best.cost >= options_.min_evidence * noise;
-    if (!decided && prediction) {
-      const auto& expected = prediction->camera_from_target.mean.rotation;
-      const double of_best = best.camera_from_target.rotation.angularDistance(expected);
-      const double of_second = second.camera_from_target.rotation.angularDistance(expected);
-      // The nearer one must be nearer by a third of the way between the two: halfway the prediction says nothing.
-      decided = std::abs(of_second - of_best) > apart / 3;
-      if (decided && of_second < of_best) std::swap(best, second);
-    }
+    result.ambiguity = std::min(best.cost, second.cost) / std::max(best.cost, second.cost);
+    evidence = chi_square(second, noise, hints) - chi_square(best, noise, hints);
+    if (evidence < 0) std::swap(best, second);
+    evidence = std::abs(evidence);
     result.second = with_covariance(second);
   }
+
+  const Residuals residuals = residuals_at(best.camera_from_target);
+  result.reprojection_rms_px = residuals.rms_px;
+  // Not "greater than": a NaN is refused too.
+  if (!(residuals.rms_sigmas <= options_.max_rms_sigmas)) return result;
   result.camera_from_target = with_covariance(best);
+  const bool decided = evidence >= options_.min_evidence;
+  if (two) {
+    // The covariance of the two as a mixture about the better one.
+    const PoseError step = pose_error(best.camera_from_target, second.camera_from_target);
+    result.camera_from_target.covariance += step * step.transpose() / (1 + std::exp(evidence / 2));
+  }
   if (!result.camera_from_target.covariance.allFinite()) return result;
-  result.status = decided ? PoseStatus::kOk : PoseStatus::kAmbiguous;
+  const bool harmless = apart < options_.same_minimum_deg * kRadFromDeg;
+  result.status = decided || harmless ? PoseStatus::kOk : PoseStatus::kAmbiguous;
   return result;
 }
 

@@ -18,27 +18,38 @@ namespace perch {
 enum class PoseStatus { kOk, kPartial, kAmbiguous, kRejected };
 
 struct PoseOptions {
-  // Root mean square distance of the corners, in units of their sigma: 1.4 is normal (two coordinates). More than
-  // this is a wrong label or no target, not noise.
+  // Root mean square distance of the corners, in units of their sigma: 1.4 is normal (two coordinates). More
+  // than this is a wrong label or no target, not noise.
   double max_rms_sigmas = 4.0;
-  // From here on a corner pulls with constant force (Huber), in sigmas: 95 % efficient on Gaussian noise at 1.345
-  // for one coordinate; a little more as these are two.
+  // From here on a corner pulls with constant force (Huber), in sigmas: 95 % efficient on Gaussian noise
+  // at 1.345 for one coordinate; a little more as these are two.
   double huber_sigmas = 2.0;
-  // By how much the cost of the second minimum must exceed that of the best, as a chi-square in the residuals' own
-  // noise. 16 is four sigma: one wrong choice in 16,000.
-  double min_evidence = 16;
+  // By how much the chosen minimum must be the likelier, as a difference of chi-squares: the residuals' in
+  // their own noise, and the angles' between the face's normal and each hint. 9 is three sigma.
+  double min_evidence = 9;
+  // How well gravity tells the face's normal: the autopilot's attitude (1 deg), the mount and how level the
+  // pad is.
+  double gravity_sigma_deg = 3;
+  // Minima closer than this are not worth a word: the covariance takes both in.
+  double same_minimum_deg = 5;
   int max_iterations = 30;  // five is normal
 };
 
 // Reads the section and refuses unknown keys.
 PoseOptions read_pose_options(Section pose);
 
+// Where the face's normal points, from something else than the picture: gravity, or the poses before.
+struct NormalHint {
+  Eigen::Vector3d normal_in_camera = Eigen::Vector3d::Zero();  // unit
+  double sigma = 1;                                            // rad
+};
+
 struct PoseResult {
   PoseStatus status = PoseStatus::kRejected;
   UncertainRigid3 camera_from_target;     // meaningful with kOk, kAmbiguous
   std::optional<UncertainRigid3> second;  // the other minimum of the planar problem
   double reprojection_rms_px = 0;         // root of the mean squared distance over the features
-  double ambiguity = 0;                   // cost of the best pose over that of the second: 0 sure, 1 undecidable
+  double ambiguity = 0;  // cost of the best pose over that of the second: 0 sure, 1 undecidable
   int features = 0;
 };
 
@@ -48,17 +59,24 @@ class PoseEstimator {
  public:
   PoseEstimator(const LandingTarget& target, const CameraModel& camera, const PoseOptions& options);
 
-  // `prediction` decides between the two minima when the picture cannot.
-  PoseResult estimate(std::span<const Correspondence> correspondences, const std::optional<Prediction>& prediction);
+  // `hints` help to decide between the two minima; they do not move either.
+  PoseResult estimate(std::span<const Correspondence> correspondences,
+                      std::span<const NormalHint> hints = {});
 
  private:
   struct Minimum {
     Rigid3 camera_from_target;
-    double cost = 0;      // sum of the squared whitened errors, with the loss
+    double cost = 0;  // sum of the squared whitened errors, with the loss
     bool converged = false;
   };
+  struct Residuals {
+    double rms_px = 0, rms_sigmas = 0;  // root mean squared distance
+  };
+  void observe(std::span<const Correspondence> correspondences);
+  Residuals residuals_at(const Rigid3& camera_from_target) const;
   Minimum refine(const Rigid3& start);
   UncertainRigid3 with_covariance(const Minimum& minimum) const;
+  double chi_square(const Minimum& minimum, double noise, std::span<const NormalHint> hints) const;
   double noise_variance(double cost) const;
 
   std::vector<Eigen::Vector2d> features_;

@@ -7,7 +7,8 @@
 namespace perch {
 namespace {
 
-constexpr double kUnprojectable = 1e6;  // whitened; far above any real residual, far below overflow when squared
+constexpr double kUnprojectable =
+    1e6;  // whitened; far above any real residual, far below overflow when squared
 
 // Huber's loss as a factor on the residual: rho(s) = |f|^2 with f = g(s) e, s = |e|^2. Beyond `huber`,
 // rho = 2 k sqrt(s) - k^2. `slope` is dg/ds.
@@ -24,12 +25,13 @@ double huber_factor(double s, double k, double* slope) {
 
 }  // namespace
 
-bool whitened_error(const CameraModel& camera, const Rigid3& camera_from_target, const Observation& observation,
-                    Eigen::Vector2d* error, PixelJacobian* jacobian) {
+bool whitened_error(const CameraModel& camera, const Rigid3& camera_from_target,
+                    const Observation& observation, Eigen::Vector2d* error, PixelJacobian* jacobian) {
   const Eigen::Vector3d rotated = camera_from_target.rotation * observation.p_target;
   const Eigen::Vector3d p_camera = rotated + camera_from_target.translation;
   Matrix23d by_point;
-  const auto pixel = jacobian ? camera.pixel_from_camera(p_camera, &by_point) : camera.pixel_from_camera(p_camera);
+  const auto pixel =
+      jacobian ? camera.pixel_from_camera(p_camera, &by_point) : camera.pixel_from_camera(p_camera);
   if (!pixel) return false;
   const double weight = 1 / observation.sigma_px;
   *error = weight * (*pixel - observation.pixel);
@@ -73,7 +75,8 @@ bool ReprojectionCost::operator()(const double* parameters, double* residuals, d
       if (slope == 0) {
         J.middleRows<2>(2 * i) = by_pose;
       } else {
-        const Eigen::Matrix2d by_error = g * Eigen::Matrix2d::Identity() + 2 * slope * error * error.transpose();
+        const Eigen::Matrix2d by_error =
+            g * Eigen::Matrix2d::Identity() + 2 * slope * error * error.transpose();
         J.middleRows<2>(2 * i) = by_error * by_pose;
       }
     }

@@ -18,13 +18,14 @@ struct Observation {
 using PoseVector = Eigen::Matrix<double, 6, 1>;  // (d, r): the pose is (Exp(r) R0, p0 + d)
 using PixelJacobian = Eigen::Matrix<double, 2, 6>;
 
-// The whitened reprojection error of one observation, (projected - seen) / sigma, and its derivative by (d, r) of
-// (Exp(r) R, p + d) at zero. False when the point cannot be projected.
-bool whitened_error(const CameraModel& camera, const Rigid3& camera_from_target, const Observation& observation,
-                    Eigen::Vector2d* error, PixelJacobian* jacobian);
+// The whitened reprojection error of one observation, (projected - seen) / sigma, and its derivative by (d,
+// r) of (Exp(r) R, p + d) at zero. False when the point cannot be projected.
+bool whitened_error(const CameraModel& camera, const Rigid3& camera_from_target,
+                    const Observation& observation, Eigen::Vector2d* error, PixelJacobian* jacobian);
 
-// The whole of it as ceres::TinySolver asks for it: 2 n residuals over (d, r) about `base`, through the full lens
-// model, with Huber's loss. The parameters live in the tangent space of the manifold R3 x SO(3) at `base`.
+// The whole of it as ceres::TinySolver asks for it: 2 n residuals over (d, r) about `base`, through the full
+// lens model, with Huber's loss. The parameters live in the tangent space of the manifold R3 x SO(3) at
+// `base`.
 class ReprojectionCost {
  public:
   using Scalar = double;
@@ -39,8 +40,8 @@ class ReprojectionCost {
   // The pose at a parameter vector.
   Rigid3 pose(const PoseVector& x) const;
 
-  // A point that cannot be projected makes every residual huge, so that the step is refused: a residual of zero
-  // would teach the optimiser to throw points out of the picture.
+  // A point that cannot be projected makes every residual huge, so that the step is refused: a residual of
+  // zero would teach the optimiser to throw points out of the picture.
   bool operator()(const double* parameters, double* residuals, double* jacobian) const;
 
  private:

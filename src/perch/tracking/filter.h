@@ -12,7 +12,8 @@ struct TrackingOptions {
   // White noise on acceleration: a small UAV's manoeuvres of 1 m/s^2 that last about a second.
   double acceleration_noise = 1.0;          // m/s^2/sqrt(Hz)
   double angular_acceleration_noise = 2.0;  // rad/s^2/sqrt(Hz)
-  // Innovations above this chi-square (6 degrees of freedom) are not believed: one honest measurement in 10,000.
+  // Innovations above this chi-square (6 degrees of freedom) are not believed: one honest measurement in
+  // 10,000.
   double gate = 27.9;
   // So many refused in a row, and it is the filter that is wrong: it starts anew from the last.
   int restart_after = 5;
@@ -36,9 +37,10 @@ class VehicleFilter {
  public:
   explicit VehicleFilter(const TrackingOptions& options) : options_(options) {}
 
-  // The state at a frame's time, with the measurement of that frame where there is one. Empty before the first
-  // measurement. Times must not go back: an earlier time than the last starts anew.
-  std::optional<VehicleState> update(int64_t timestamp_ns, const std::optional<UncertainRigid3>& pad_from_body);
+  // The state at a frame's time, with the measurement of that frame where there is one. Empty before the
+  // first measurement. Times must not go back: an earlier time than the last starts anew.
+  std::optional<VehicleState> update(int64_t timestamp_ns,
+                                     const std::optional<UncertainRigid3>& pad_from_body);
 
   // Where the body will be, without changing anything; empty when not tracking.
   std::optional<VehicleState> predict(int64_t timestamp_ns) const;
