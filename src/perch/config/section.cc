@@ -177,6 +177,13 @@ void Section::fail(std::string_view key, const std::string& expected) const {
           expected);
 }
 
+void Section::fail(std::string_view key, const std::string& expected, const std::string& found) const {
+  const YAML::Node& map = node_;
+  const YAML::Node node = map.IsMap() ? map[std::string(key)] : YAML::Node(YAML::NodeType::Undefined);
+  const std::string path = full_key(key);
+  throw ConfigError(place(node, path) + ": " + path + ": expected " + expected + ", found " + found);
+}
+
 void Section::fail(const std::string& what) const {
   throw ConfigError(place(node_, path_) + (path_.empty() ? "" : ": " + path_) + ": " + what);
 }

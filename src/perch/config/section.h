@@ -88,6 +88,8 @@ class Section {
 
   // For what a single key's type cannot say: throws "file:line: key: expected ..., found ...".
   [[noreturn]] void fail(std::string_view key, const std::string& expected) const;
+  // The same where what is wrong is not the value itself: a square that overlaps another.
+  [[noreturn]] void fail(std::string_view key, const std::string& expected, const std::string& found) const;
   // For what is wrong with the whole section: "file:line: section: what".
   [[noreturn]] void fail(const std::string& what) const;
 
