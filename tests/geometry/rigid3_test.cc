@@ -26,7 +26,8 @@ TEST(Rigid3, ProductMapsAsItsFactorsInTurn) {
 }
 
 TEST(Rigid3, RotatesBeforeItMoves) {
-  const Rigid3 b_from_a{Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())), {10, 0, 0}};
+  const Rigid3 b_from_a{Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())),
+                        {10, 0, 0}};
   EXPECT_LE((b_from_a * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(10, 1, 0)).norm(), 10 * kEpsilon);
 }
 

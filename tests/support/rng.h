@@ -11,8 +11,8 @@
 
 namespace perch {
 
-// A random stream seeded from the running test's name and a number: the order of the tests changes nothing, and
-// the number repeats a failure.
+// A random stream seeded from the running test's name and a number: the order of the tests changes nothing,
+// and the number repeats a failure.
 class TestRng {
  public:
   explicit TestRng(unsigned number = 0) {

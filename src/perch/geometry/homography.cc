@@ -46,6 +46,9 @@ std::optional<Eigen::Matrix3d> homography_from_points(std::span<const Eigen::Vec
   const Eigen::Matrix<double, 9, 1> h = eigen.eigenvectors().col(0);
   Eigen::Matrix3d H;
   H << h.segment<3>(0).transpose(), h.segment<3>(3).transpose(), h.segment<3>(6).transpose();
+  // Three of `from` in a line that are none in `to` (or the other way round) leave one solution, a singular
+  // one. A square seen at 0.1 degrees from its plane still has 1e-3.
+  if (!(std::abs(H.determinant()) > 1e-9)) return std::nullopt;
   H = t_to->inverse() * H * *t_from;
   return Eigen::Matrix3d(H / H.norm());
 }

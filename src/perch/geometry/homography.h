@@ -8,7 +8,7 @@ namespace perch {
 
 // H with (u, v, 1) ~ H (x, y, 1) for each pair, least squares by the normalised DLT (Hartley 1997).
 // At least four pairs, no three of them in a line; empty when the sizes differ, a number is not finite or
-// the points are (nearly) degenerate. Scaled to unit Frobenius norm.
+// the points are (nearly) degenerate, so that the H returned can be inverted. Scaled to unit Frobenius norm.
 std::optional<Eigen::Matrix3d> homography_from_points(std::span<const Eigen::Vector2d> from,
                                                       std::span<const Eigen::Vector2d> to);
 

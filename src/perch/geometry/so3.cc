@@ -7,8 +7,8 @@ namespace perch {
 
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector) {
   const double angle = rotation_vector.norm();
-  // sin(a/2)/a: the series' next term, a^4/3840, is below rounding for a < 1e-3.
-  const double k = angle < 1e-3 ? 0.5 - angle * angle / 48 : std::sin(angle / 2) / angle;
+  // sin(a/2)/a has no cancellation: only 0/0, where the squares underflow too, needs its limit.
+  const double k = angle > 0 ? std::sin(angle / 2) / angle : 0.5;
   const Eigen::Vector3d v = k * rotation_vector;
   return Eigen::Quaterniond(std::cos(angle / 2), v.x(), v.y(), v.z()).normalized();
 }
@@ -25,10 +25,11 @@ Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation) {
 Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& rotation_vector) {
   const double a2 = rotation_vector.squaredNorm();
   const double a = std::sqrt(a2);
-  // Below 1e-4 the differences 1 - cos a and a - sin a lose more digits than the series' next terms.
-  const bool small = a < 1e-4;
-  const double b = small ? 0.5 - a2 / 24 : (1 - std::cos(a)) / a2;
-  const double c = small ? 1.0 / 6 - a2 / 120 : (a - std::sin(a)) / (a2 * a);
+  // (1 - cos a) / a^2 by the half angle: the difference would leave 1e-12 of error in J at a = 1e-4.
+  const double half = a > 0 ? std::sin(a / 2) / a : 0.5;
+  const double b = 2 * half * half;
+  // What a - sin a loses, epsilon / a^2 of c, its factor a^2 takes back; the series serves against 0/0 only.
+  const double c = a < 1e-4 ? 1.0 / 6 - a2 / 120 : (a - std::sin(a)) / (a2 * a);
   const Eigen::Matrix3d r = skew(rotation_vector);
   return Eigen::Matrix3d::Identity() + b * r + c * r * r;
 }

@@ -5,7 +5,8 @@
 
 namespace perch {
 
-// Rotation vectors (axis times angle, rad) and unit quaternions: the exponential map of SO(3) and its inverse.
+// Rotation vectors (axis times angle, rad) and unit quaternions: the exponential map of SO(3) and its
+// inverse.
 
 // The matrix of the cross product: skew(a) * b = a x b.
 inline Eigen::Matrix3d skew(const Eigen::Vector3d& a) {

@@ -9,8 +9,7 @@ namespace perch {
 
 PoseError pose_error(const Rigid3& estimate, const Rigid3& truth) {
   PoseError error;
-  error << truth.translation - estimate.translation,
-      so3_log(truth.rotation * estimate.rotation.conjugate());
+  error << truth.translation - estimate.translation, so3_log(truth.rotation * estimate.rotation.conjugate());
   return error;
 }
 
@@ -25,13 +24,13 @@ UncertainRigid3 operator*(const UncertainRigid3& c_from_b, const UncertainRigid3
   PoseCovariance by_b = PoseCovariance::Zero();
   by_b.topLeftCorner<3, 3>() = R;
   by_b.bottomRightCorner<3, 3>() = R;
-  return {c_from_b.mean * b_from_a.mean, by_a * c_from_b.covariance * by_a.transpose() +
-                                             by_b * b_from_a.covariance * by_b.transpose()};
+  return {c_from_b.mean * b_from_a.mean,
+          by_a * c_from_b.covariance * by_a.transpose() + by_b * b_from_a.covariance * by_b.transpose()};
 }
 
 UncertainRigid3 inverse(const UncertainRigid3& b_from_a) {
-  // truth = (Exp(r) R, p + d). Its inverse has the rotation R^T Exp(-r) = Exp(-R^T r) R^T, and the translation
-  // -R^T Exp(-r) (p + d) = -R^T p - R^T d + R^T [r]x p = p' - R^T d - R^T [p]x r to first order.
+  // truth = (Exp(r) R, p + d). Its inverse has the rotation R^T Exp(-r) = Exp(-R^T r) R^T, and the
+  // translation -R^T Exp(-r) (p + d) = -R^T p - R^T d + R^T [r]x p = p' - R^T d - R^T [p]x r to first order.
   const Rigid3 a_from_b = inverse(b_from_a.mean);
   const Eigen::Matrix3d Rt = a_from_b.rotation.toRotationMatrix();
   PoseCovariance by = PoseCovariance::Zero();
