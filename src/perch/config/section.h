@@ -8,21 +8,16 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <stdexcept>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "perch/config/error.h"
 #include "perch/geometry/rigid3.h"
 
 namespace perch {
-
-// what(): "run.yaml:7: camera.rate: expected a number above 0, found \"fast\"".
-class ConfigError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 // Closed bounds of a number; the defaults exclude only NaN and infinity.
 struct Range {
@@ -48,7 +43,8 @@ class Section {
   // Reads a file. `overrides` are key.path=value as --set takes them: they win over the file; their relative
   // paths are relative to the working directory.
   static Section load(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
-  // The same of a text; `name` stands for the file in messages, and relative paths are relative to its folder.
+  // The same of a text; `name` stands for the file in messages, and relative paths are relative to its
+  // folder.
   static Section parse(const std::string& text, const std::filesystem::path& name,
                        const std::vector<std::string>& overrides = {});
 
@@ -63,6 +59,9 @@ class Section {
   void read(std::string_view key, std::optional<Rigid3>& value);
   // A path; a relative one is relative to the file (or, from --set, to the working directory).
   void read(std::string_view key, std::filesystem::path& value);
+  // "scheme:rest", as camera.source has it; with one of `file_schemes` the rest is a path, taken as above.
+  void read_source(std::string_view key, std::string& value,
+                   std::initializer_list<std::string_view> file_schemes);
   // One of the names.
   template <typename Enum>
   void read_choice(std::string_view key, Enum& value,
@@ -105,22 +104,28 @@ class Section {
 
  private:
   struct Document;
-  Section(std::shared_ptr<Document> document, YAML::Node node, YAML::Node resolved, std::string path);
+  Section(std::shared_ptr<Document> document, YAML::Node node, YAML::Node resolved, std::string path,
+          int line);
 
   // The node of a key, marked as known; undefined where there is none.
   YAML::Node find(std::string_view key);
   std::string full_key(std::string_view key) const;
+  int line_of(const YAML::Node& node, const std::string& path) const;
   std::string place(const YAML::Node& node, const std::string& path) const;
-  [[noreturn]] void fail_at(const YAML::Node& node, const std::string& path, const std::string& expected) const;
+  [[noreturn]] void fail_at(const YAML::Node& node, const std::string& path,
+                            const std::string& expected) const;
   size_t choose(std::string_view key, const std::vector<std::string_view>& names, size_t chosen);
-  std::vector<double> numbers(const YAML::Node& node, const std::string& path, size_t size, Range range) const;
+  std::vector<double> numbers(const YAML::Node& node, const std::string& path, size_t size,
+                              Range range) const;
   double number(const YAML::Node& node, const std::string& path, Range range) const;
+  Rigid3 pose(const YAML::Node& node, const std::string& path) const;
 
   std::shared_ptr<Document> document_;
   YAML::Node node_;      // what the file says
   YAML::Node resolved_;  // with every default filled in
   std::string path_;     // "detection.paper", empty at the root
-  std::shared_ptr<std::vector<std::string>> known_;
+  int line_;             // of the mapping's key, or where a missing one would be; from 0
+  std::shared_ptr<std::set<std::string>> known_;
 };
 
 }  // namespace perch

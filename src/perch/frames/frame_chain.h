@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
 #include <optional>
 
 #include "perch/config/section.h"
@@ -63,7 +65,7 @@ std::optional<Rigid3> pad_from_body_by_navigation(const FrameChain& chain, const
 
 // The moment of the navigation clock at which a frame was taken.
 inline int64_t navigation_time_ns(const FrameChain& chain, int64_t camera_time_ns) {
-  return camera_time_ns - static_cast<int64_t>(chain.time_offset * 1e9);
+  return camera_time_ns - std::llround(chain.time_offset * 1e9);
 }
 
 }  // namespace perch
