@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "perch/geometry/euler.h"
+#include "perch/geometry/so3.h"
 #include "support/config_error.h"
 #include "support/near_pose.h"
 #include "support/rng.h"
@@ -110,6 +111,58 @@ TEST(FrameChain, VisionAndNavigationAgreeInOneWorld) {
   }
 }
 
+TEST(FrameChain, TheWayBackUndoesTheWayThereUncertaintyAndAll) {
+  TestRng rng;
+  for (int i = 0; i < 100; ++i) {
+    FrameChain chain;
+    chain.target_from_pad = rng.pose(1);
+    chain.pan_tilt = PanTilt{rng.pose(1)};
+    chain.body_from_base = rng.pose(1);
+    const HeadAngles angles{rng.normal(), rng.normal()};
+    UncertainRigid3 seen{rng.pose(5)};
+    seen.covariance.diagonal() << 1, 2, 3, 0.1, 0.2, 0.3;
+    const UncertainRigid3 back =
+        camera_from_target_of(chain, pad_from_body_by_vision(chain, seen, angles), angles);
+    EXPECT_THAT(back.mean, IsNearPose(seen.mean, 64 * kEpsilon, 64 * kEpsilon * 20));
+    // Squares of lever arms of some 20 m, there and back.
+    EXPECT_THAT(back.covariance, IsNearMatrix(seen.covariance, 64 * kEpsilon * 400));
+  }
+}
+
+TEST(FrameChain, LevelNormalIsTheTargetsOwnWhereItsPlaceIsKnown) {
+  TestRng rng;
+  FrameChain chain;
+  chain.target_from_pad = rng.pose(1);
+  chain.body_from_base = rng.pose(1);
+  chain.world_from_pad = rng.pose(10);
+  const Rigid3 world_from_body = rng.pose(10);
+  const Rigid3 camera_from_target = inverse(world_from_body * *chain.body_from_base) * *chain.world_from_pad *
+                                    inverse(chain.target_from_pad);
+  const auto normal = level_normal_in_camera(chain, world_from_body.rotation);
+  ASSERT_TRUE(normal);
+  EXPECT_THAT(*normal, IsNearMatrix(camera_from_target.rotation * Eigen::Vector3d::UnitZ(), 32 * kEpsilon));
+}
+
+TEST(FrameChain, LevelNormalPointsAtACameraThatLooksDownWhetherTheWorldsZIsUpOrDown) {
+  const Eigen::Quaterniond ned = rotation_from_ypr({0.3, 0, 0}), enu(0, 1, 0, 0);
+  for (const auto& world_from_camera : {ned, enu}) {
+    const auto normal = level_normal_in_camera(FrameChain{}, world_from_camera);
+    ASSERT_TRUE(normal);
+    EXPECT_THAT(*normal, IsNearMatrix(Eigen::Vector3d(0, 0, -1), 8 * kEpsilon));
+  }
+}
+
+TEST(FrameChain, LevelNormalIsUnknownNearTheHorizonAndWithoutAnAttitude) {
+  const auto looking_down_by = [](double angle) { return so3_exp({pi / 2 - angle, 0, 0}); };
+  EXPECT_TRUE(level_normal_in_camera(FrameChain{}, looking_down_by(21 * kRadFromDeg)));
+  EXPECT_FALSE(level_normal_in_camera(FrameChain{}, looking_down_by(19 * kRadFromDeg)));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  FrameChain chain;
+  EXPECT_FALSE(level_normal_in_camera(chain, {nan, 0, 0, 1}));
+  chain.world_from_pad = Rigid3{};
+  EXPECT_FALSE(level_normal_in_camera(chain, {nan, 0, 0, 1}));
+}
+
 TEST(FrameChain, CameraUncertaintyArrivesInThePadFrame) {
   // The camera is sure of all but the distance, along its z. Looking straight down that is the pad's z.
   FrameChain chain;
@@ -136,8 +189,8 @@ TEST(FrameChain, NavigationTimeIsCameraTimeLessTheOffset) {
   constexpr int64_t kEpoch = 1700000000123456789;  // more digits than a double has
   FrameChain chain;
   EXPECT_EQ(navigation_time_ns(chain, kEpoch), kEpoch);
-  // 0.29 * 1e9 is a little below 290000000 in binary, 0.57 * 1e9 too: cut off they would be 1 ns short.
-  for (const int64_t ms : {1, 290, 570, -290, 86400000}) {
+  // 1.001 * 1e9 is a little below 1001000000 in binary: cut off it would be 1 ns short.
+  for (const int64_t ms : {1, 1001, -1001, 86400000}) {
     chain.time_offset = static_cast<double>(ms) / 1000;
     EXPECT_EQ(navigation_time_ns(chain, kEpoch), kEpoch - ms * 1000000) << ms;
   }

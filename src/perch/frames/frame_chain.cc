@@ -61,6 +61,7 @@ std::optional<Eigen::Vector3d> level_normal_in_camera(const FrameChain& chain,
                                                       const std::optional<HeadAngles>& angles) {
   const Eigen::Quaterniond camera_from_world =
       camera_from_body(chain, angles).rotation * world_from_body.conjugate();
+  if (!camera_from_world.coeffs().allFinite()) return std::nullopt;
   if (chain.world_from_pad) {
     const Eigen::Quaterniond world_from_target =
         chain.world_from_pad->rotation * chain.target_from_pad.rotation.conjugate();

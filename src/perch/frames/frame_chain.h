@@ -55,7 +55,7 @@ UncertainRigid3 camera_from_target_of(const FrameChain& chain, const UncertainRi
 // Where the face of a level target points, seen by the camera at this attitude (the rotation of
 // world_from_body). With world_from_pad the face's own normal; without it the pad is taken as level in a
 // world whose z is up or down. Then it is empty when the camera looks too near the horizon to tell the face
-// from its back.
+// from its back; empty too without a finite attitude.
 std::optional<Eigen::Vector3d> level_normal_in_camera(const FrameChain& chain,
                                                       const Eigen::Quaterniond& world_from_body,
                                                       const std::optional<HeadAngles>& angles = {});
