@@ -1,0 +1,71 @@
+#include "perch/analysis/frame_record.h"
+
+#include <cmath>
+
+#include "perch/geometry/euler.h"
+
+namespace perch {
+
+SixStates six_states(const Rigid3& pad_from_body) {
+  const YawPitchRoll angles = ypr_from_rotation(pad_from_body.rotation);
+  SixStates states;
+  states << pad_from_body.translation, angles.yaw, angles.pitch, angles.roll;
+  return states;
+}
+
+SixStates six_sigmas(const UncertainRigid3& pad_from_body) {
+  // The rotation vector of a small change, in pad axes, is each angle's change about its own axis:
+  //   r = e_z dyaw + Rz e_y dpitch + Rz Ry e_x droll.
+  const YawPitchRoll angles = ypr_from_rotation(pad_from_body.mean.rotation);
+  const double cy = std::cos(angles.yaw), sy = std::sin(angles.yaw);
+  const double cp = std::cos(angles.pitch), sp = std::sin(angles.pitch);
+  Eigen::Matrix3d r_from_angles;
+  r_from_angles << 0, -sy, cy * cp,  //
+      0, cy, sy * cp,                //
+      1, 0, -sp;
+  const Eigen::Matrix3d angles_from_r = r_from_angles.inverse();
+  const Eigen::Matrix3d rotation = pad_from_body.covariance.bottomRightCorner<3, 3>();
+  SixStates sigmas;
+  sigmas << pad_from_body.covariance.diagonal().head<3>(),
+      (angles_from_r * rotation * angles_from_r.transpose()).diagonal();
+  return sigmas.cwiseSqrt();
+}
+
+FrameError frame_error(const UncertainRigid3& vision, const Rigid3& navigation) {
+  FrameError error;
+  error.difference = six_states(vision.mean) - six_states(navigation);
+  for (int i = 3; i < 6; ++i) error.difference[i] = wrap_angle(error.difference[i]);
+  error.position = error.difference.head<3>().norm();
+  error.rotation = vision.mean.rotation.angularDistance(navigation.rotation);
+  const double nees = normalised_error_squared(pose_error(vision.mean, navigation), vision.covariance);
+  if (std::isfinite(nees)) error.nees = nees;
+  return error;
+}
+
+FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain, const NavTrack& nav) {
+  FrameRecord record;
+  record.timestamp_ns = estimate.timestamp_ns;
+  record.status = estimate.status;
+  record.total_us = estimate.total_us;
+  record.ambiguity = estimate.ambiguity;
+
+  std::optional<Rigid3> navigation;
+  if (const auto sample = nav.at(navigation_time_ns(chain, estimate.timestamp_ns))) {
+    navigation = pad_from_body_by_navigation(chain, sample->world_from_body);
+  }
+  if (navigation) record.navigation = six_states(*navigation);
+
+  if (estimate.status != EstimateStatus::kOk || !estimate.pad_from_body) return record;
+  const UncertainRigid3& vision = *estimate.pad_from_body;
+  const SixStates states = six_states(vision.mean);
+  if (!states.allFinite()) return record;  // one NaN would make every statistic NaN
+  record.range = estimate.camera_from_target.mean.translation.norm();
+  record.reprojection_rms_px = estimate.reprojection_rms_px;
+  record.features = estimate.features;
+  record.vision = states;
+  record.sigma = six_sigmas(vision);
+  if (navigation) record.error = frame_error(vision, *navigation);
+  return record;
+}
+
+}  // namespace perch

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "perch/estimator/estimate.h"
+#include "perch/flight/nav_track.h"
+#include "perch/frames/frame_chain.h"
+
+namespace perch {
+
+// A pose of the body in the pad frame as the paper's figure 3.4 plots it: x, y, z [m], then the ZYX angles
+// yaw, pitch, roll [rad].
+using SixStates = Eigen::Matrix<double, 6, 1>;
+inline constexpr std::array<std::string_view, 6> kStateNames = {"x", "y", "z", "yaw", "pitch", "roll"};
+inline constexpr bool is_angle(size_t state) { return state >= 3; }
+
+SixStates six_states(const Rigid3& pad_from_body);
+
+// The standard deviations of the six states. The angles' are infinite or NaN at pitch = +-pi/2, where a small
+// rotation can be any change of yaw and roll.
+SixStates six_sigmas(const UncertainRigid3& pad_from_body);
+
+// How far vision is from navigation.
+struct FrameError {
+  SixStates difference = SixStates::Zero();  // vision minus navigation; angles wrapped to (-pi, pi]
+  double position = 0;                       // length of the position's difference, m
+  double rotation = 0;  // angle between the two attitudes, rad: free of the ZYX angles' pole
+  // Normalised error squared of position and rotation under vision's covariance; empty when that is not
+  // positive definite. Navigation's own noise is not in it: NEES above 6 may be navigation's fault.
+  std::optional<double> nees;
+};
+
+// What the analysis keeps of an estimate: some 350 bytes, so that a long flight's correspondences can go.
+struct FrameRecord {
+  int64_t timestamp_ns = 0;  // camera clock
+  EstimateStatus status = EstimateStatus::kNoTarget;
+  double total_us = 0;
+  double ambiguity = 0;
+  // With kOk:
+  double range = std::numeric_limits<double>::quiet_NaN();  // camera to the target's origin, m
+  double reprojection_rms_px = std::numeric_limits<double>::quiet_NaN();
+  int features = 0;
+  std::optional<SixStates> vision, sigma;
+  // Wherever navigation and world_from_pad are there, detected or not:
+  std::optional<SixStates> navigation;
+  // Where both are:
+  std::optional<FrameError> error;
+};
+
+FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain, const NavTrack& nav);
+
+FrameError frame_error(const UncertainRigid3& vision, const Rigid3& navigation);
+
+}  // namespace perch

@@ -1,0 +1,179 @@
+#include "perch/analysis/score.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perch {
+namespace {
+
+// At most this many bins: more would leave too few frames in each for an RMS.
+constexpr double kMostBins = 10;
+
+// The shortest of 1, 2, 5, 10, ... (and their tenths) that covers `span` in at most kMostBins steps: edges at
+// which a person would put them.
+double bin_width(double span) {
+  // A hovering flight's range hardly varies: one bin of a centimetre then.
+  const double least = std::max(span / (kMostBins - 1), 0.01);
+  const double decade = std::pow(10, std::floor(std::log10(least)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    // The tolerance forgives the rounding of pow and log10.
+    if (factor * decade >= least * (1 - 1e-9)) return factor * decade;
+  }
+  return 10 * decade;
+}
+
+std::vector<DistanceBin> bin_by_distance(const std::vector<const FrameRecord*>& compared) {
+  if (compared.empty()) return {};
+  const auto [nearest, farthest] = std::minmax_element(
+      compared.begin(), compared.end(), [](const auto* a, const auto* b) { return a->range < b->range; });
+  const double width = bin_width((*farthest)->range - (*nearest)->range);
+  const double first = std::floor((*nearest)->range / width);
+  const auto index = [&](double range) { return static_cast<size_t>(std::floor(range / width) - first); };
+
+  struct Errors {
+    std::vector<double> position, rotation;
+  };
+  std::vector<Errors> errors(index((*farthest)->range) + 1);
+  for (const FrameRecord* frame : compared) {
+    errors[index(frame->range)].position.push_back(frame->error->position);
+    errors[index(frame->range)].rotation.push_back(frame->error->rotation);
+  }
+  std::vector<DistanceBin> bins;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    const Statistics position = statistics(errors[i].position);
+    const double from = (first + static_cast<double>(i)) * width;
+    bins.push_back({.from = from,
+                    .to = from + width,
+                    .count = position.count,
+                    .position_rms = position.rms,
+                    .position_median = position.median,
+                    .rotation_rms = statistics(errors[i].rotation).rms});
+  }
+  return bins;
+}
+
+Consistency check_consistency(const std::vector<const FrameRecord*>& compared) {
+  Consistency consistency;
+  double sum = 0;
+  size_t inside = 0;
+  for (const FrameRecord* frame : compared) {
+    if (!frame->error->nees) continue;
+    const double nees = *frame->error->nees;
+    ++consistency.count;
+    sum += nees;
+    if (kNeesLower <= nees && nees <= kNeesUpper) ++inside;
+  }
+  if (consistency.count == 0) return consistency;
+  const auto n = static_cast<double>(consistency.count);
+  consistency.mean_nees = sum / n;
+  const int degrees_of_freedom = 6 * static_cast<int>(consistency.count);
+  consistency.lower = chi_square_quantile(0.025, degrees_of_freedom) / n;
+  consistency.upper = chi_square_quantile(0.975, degrees_of_freedom) / n;
+  consistency.fraction_inside = static_cast<double>(inside) / n;
+  return consistency;
+}
+
+Comparison comparison_of(const FlightResult& result, bool any_compared) {
+  if (any_compared) return Comparison::kCompared;
+  if (result.flight.nav.samples.empty()) return Comparison::kNoNavigation;
+  if (!result.chain.world_from_pad) return Comparison::kNoWorldFromPad;
+  return Comparison::kNoCommonTime;
+}
+
+void score_errors(const std::vector<const FrameRecord*>& compared, FlightScore& score) {
+  std::array<std::vector<double>, 6> states;
+  std::vector<double> position, rotation, relative;
+  for (const FrameRecord* frame : compared) {
+    for (size_t i = 0; i < 6; ++i)
+      states[i].push_back(frame->error->difference[static_cast<Eigen::Index>(i)]);
+    position.push_back(frame->error->position);
+    rotation.push_back(frame->error->rotation);
+    if (frame->range > 0) relative.push_back(frame->error->position / frame->range);
+  }
+  for (size_t i = 0; i < 6; ++i) {
+    score.states[i] = is_angle(i) ? angle_statistics(states[i]) : statistics(states[i]);
+  }
+  score.position = statistics(position);
+  score.rotation = statistics(rotation);
+  score.relative_position_rms = statistics(relative).rms;
+}
+
+}  // namespace
+
+const char* to_string(Comparison comparison) {
+  switch (comparison) {
+    case Comparison::kCompared:
+      return "compared";
+    case Comparison::kNoNavigation:
+      return "no navigation";
+    case Comparison::kNoWorldFromPad:
+      return "no world_from_pad";
+    case Comparison::kNoCommonTime:
+      return "no detected frame within the navigation's time";
+  }
+  return "";
+}
+
+FlightScore score_flight(const FlightResult& result) {
+  FlightScore score;
+  score.name = result.flight.name;
+  score.target = result.target;
+  score.configuration = result.configuration;
+  score.frame_names = result.frame_names;
+  score.frame_names.resize(result.estimates.size());
+  score.problems = result.flight.problems;
+  score.problems.insert(score.problems.end(), result.problems.begin(), result.problems.end());
+
+  score.frames.reserve(result.estimates.size());
+  for (const Estimate& estimate : result.estimates) {
+    score.frames.push_back(make_frame_record(estimate, result.chain, result.flight.nav));
+  }
+  std::vector<const FrameRecord*> compared;
+  std::vector<double> reprojection_px;
+  for (const FrameRecord& frame : score.frames) {
+    if (frame.vision) reprojection_px.push_back(frame.reprojection_rms_px);
+    if (frame.error) compared.push_back(&frame);
+  }
+  score.comparison = comparison_of(result, !compared.empty());
+  score_errors(compared, score);
+  score.bins = bin_by_distance(compared);
+  score.consistency = check_consistency(compared);
+  score.reprojection_px = statistics(reprojection_px);
+  score.detections = count_detections(score.frames);
+  score.costs = measure_stage_costs(result.estimates);
+  return score;
+}
+
+std::vector<ShownFrame> frames_to_show(const FlightScore& score) {
+  const bool by_error = score.comparison == Comparison::kCompared;
+  const auto badness = [&](size_t i) {
+    return by_error ? score.frames[i].error->position : score.frames[i].reprojection_rms_px;
+  };
+  std::vector<size_t> order;
+  for (size_t i = 0; i < score.frames.size(); ++i) {
+    if (by_error ? score.frames[i].error.has_value() : score.frames[i].vision.has_value()) order.push_back(i);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return badness(a) < badness(b); });
+
+  std::vector<ShownFrame> shown;
+  if (!order.empty()) shown.push_back({order.front(), "best"});
+  if (order.size() > 2) shown.push_back({order[order.size() / 2], "median"});
+  if (order.size() > 1) shown.push_back({order.back(), "worst"});
+
+  const auto seen = [](const Gap& gap) {
+    return gap.frames - gap.reasons[static_cast<size_t>(EstimateStatus::kUnreadable)];
+  };
+  const auto longest = std::max_element(score.detections.gaps.begin(), score.detections.gaps.end(),
+                                        [&](const Gap& a, const Gap& b) { return seen(a) < seen(b); });
+  if (longest != score.detections.gaps.end() && seen(*longest) > 0) {
+    size_t frame = longest->first_frame + longest->frames / 2;
+    // Pictures that cannot be read show nothing: the next one round the gap that can.
+    while (score.frames[frame].status == EstimateStatus::kUnreadable) {
+      frame = frame + 1 < longest->first_frame + longest->frames ? frame + 1 : longest->first_frame;
+    }
+    shown.push_back({frame, "longest gap"});
+  }
+  return shown;
+}
+
+}  // namespace perch
