@@ -118,7 +118,6 @@ FlightScore score_flight(const FlightResult& result) {
   FlightScore score;
   score.name = result.flight.name;
   score.target = result.target;
-  score.configuration = result.configuration;
   score.frame_names = result.frame_names;
   score.frame_names.resize(result.estimates.size());
   score.problems = result.flight.problems;
@@ -127,6 +126,7 @@ FlightScore score_flight(const FlightResult& result) {
   score.frames.reserve(result.estimates.size());
   for (const Estimate& estimate : result.estimates) {
     score.frames.push_back(make_frame_record(estimate, result.chain, result.flight.nav));
+    if (!estimate.problem.empty()) score.problems.push_back(estimate.problem);
   }
   std::vector<const FrameRecord*> compared;
   std::vector<double> reprojection_px;

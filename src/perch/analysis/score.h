@@ -19,8 +19,7 @@ struct FlightResult {
   FrameChain chain;                      // as the estimator ran with it
   std::vector<Estimate> estimates;       // one a frame, in the flight's order
   std::vector<std::string> frame_names;  // Frame::name, one an estimate; or none
-  std::vector<std::string> problems;     // besides flight.problems: the source's and the unreadable pictures'
-  std::string configuration;             // Section::resolved(), for the report
+  std::vector<std::string> problems;     // the source's, besides those of `flight` and of the estimates
   std::string target;                    // "sharp, 1 m", for the report
 };
 
@@ -50,7 +49,7 @@ enum class Comparison { kCompared, kNoNavigation, kNoWorldFromPad, kNoCommonTime
 const char* to_string(Comparison comparison);
 
 struct FlightScore {
-  std::string name, target, configuration;
+  std::string name, target;
   std::vector<FrameRecord> frames;
   std::vector<std::string> frame_names;
   std::vector<std::string> problems;

@@ -1,0 +1,186 @@
+// The plots of the report, on uPlot: time plots that share cursor and zoom, the status strip, the scatter.
+'use strict';
+
+// The statuses in the order of their digits in the data. Colours of Okabe and Ito: told apart by the colour-blind.
+const STATUSES = [
+  {name: 'ok', words: 'pose', colour: '#009e73'},
+  {name: 'no_target', words: 'no target', colour: '#8c8c8c'},
+  {name: 'partial', words: 'partial', colour: '#e6b800'},
+  {name: 'ambiguous', words: 'ambiguous', colour: '#cc79a7'},
+  {name: 'rejected', words: 'rejected', colour: '#d55e00'},
+  {name: 'unreadable', words: 'unreadable', colour: '#3b3b3b'},
+];
+
+const theme = (name) => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
+
+// All digits that tell something, none that do not: 0.0123, 1.23, 123.
+function short(value) {
+  if (value == null || !isFinite(value)) return '–';
+  const size = Math.abs(value);
+  if (size >= 1e5 || (size > 0 && size < 1e-4)) return value.toExponential(1).replace('-', '−');
+  const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : size >= 0.1 ? 3 : 4;
+  return value.toFixed(digits).replace('-', '−');
+}
+
+// Plots that show the same stretch of time: zooming one zooms all.
+class TimeGroup {
+  constructor(key) {
+    this.key = key;
+    this.plots = [];
+    this.zooming = false;
+  }
+  zoom(from) {
+    if (this.zooming) return;
+    this.zooming = true;
+    const {min, max} = from.scales.x;
+    for (const plot of this.plots) {
+      if (plot !== from && (plot.scales.x.min !== min || plot.scales.x.max !== max)) plot.setScale('x', {min, max});
+    }
+    this.zooming = false;
+  }
+}
+
+// Shades the frames without a pose behind the lines: from one frame to the next.
+function shadeGaps(times, status) {
+  const gaps = [];
+  for (let i = 0; i < status.length; ++i) {
+    if (status[i] === '0') continue;
+    const end = times[Math.min(i + 1, times.length - 1)];
+    if (gaps.length && gaps[gaps.length - 1][1] >= times[i]) gaps[gaps.length - 1][1] = end;
+    else gaps.push([times[i], end]);
+  }
+  return (plot) => {
+    const {ctx, bbox} = plot;
+    ctx.save();
+    ctx.fillStyle = theme('gap');
+    for (const [from, to] of gaps) {
+      const x0 = Math.max(plot.valToPos(from, 'x', true), bbox.left);
+      const x1 = Math.min(plot.valToPos(to, 'x', true), bbox.left + bbox.width);
+      if (x1 > bbox.left && x0 < bbox.left + bbox.width) ctx.fillRect(x0, bbox.top, Math.max(1, x1 - x0), bbox.height);
+    }
+    ctx.restore();
+  };
+}
+
+function axis(label, more) {
+  return Object.assign({
+    label, stroke: theme('muted'), labelFont: '12px system-ui, sans-serif', font: '11px system-ui, sans-serif',
+    labelSize: 18, labelGap: 0, grid: {stroke: theme('grid'), width: 1}, ticks: {stroke: theme('grid'), size: 4},
+  }, more);
+}
+
+const yAxis = (label, more) => axis(label, Object.assign({
+  size: 52, values: (plot, ticks) => ticks.map((v) => String(+v.toPrecision(6)).replace('-', '−')),
+}, more));
+
+// A line; `count` decides whether single points can be told apart.
+function line(label, colour, count, more) {
+  return Object.assign({
+    label, stroke: colour, width: 1.5, points: {show: count < 400, size: 4, fill: colour, stroke: colour},
+    value: (plot, v) => short(v),
+  }, more);
+}
+
+// Puts a plot into `parent`, as wide as it, and keeps it so. Returns the uPlot.
+function place(parent, options, data) {
+  const width = () => Math.max(240, parent.clientWidth);
+  const plot = new uPlot(Object.assign({width: width(), height: 210}, options), data, parent);
+  const observer = new ResizeObserver(() => {
+    if (plot.width !== width()) plot.setSize({width: width(), height: options.height || 210});
+  });
+  observer.observe(parent);
+  parent.addEventListener('perch-remove', () => { observer.disconnect(); plot.destroy(); }, {once: true});
+  return plot;
+}
+
+// One plot against time in a group. `series` without the time's own.
+function timePlot(parent, group, {label, series, bands, data, height, scales, axes, drawUnder, drawOver}) {
+  const options = {
+    height,
+    scales: Object.assign({x: {time: false}}, scales),
+    axes: axes || [axis('time [s]', {size: 28}), yAxis(label)],
+    series: [{label: 's', value: (plot, v) => (v == null ? '–' : v.toFixed(3))}, ...series],
+    bands,
+    cursor: {
+      sync: {key: group.key, setSeries: false, scales: ['x', null],
+             filters: {pub: (type) => type === 'mousemove' || type === 'mouseleave'}},
+      drag: {x: true, y: false}, points: {size: 6},
+    },
+    legend: {live: true},
+    hooks: {
+      drawClear: drawUnder ? [drawUnder] : [],
+      draw: drawOver ? [drawOver] : [],
+      setScale: [(plot, key) => { if (key === 'x') group.zoom(plot); }],
+    },
+  };
+  const plot = place(parent, options, data);
+  group.plots.push(plot);
+  return plot;
+}
+
+// The frames' statuses as a strip of colours. A frame lasts until the next one; the worse status wins a pixel.
+function statusStrip(parent, group, times, status) {
+  const drawOver = (plot) => {
+    const {ctx, bbox} = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    const typical = times.length > 1 ? (times[times.length - 1] - times[0]) / (times.length - 1) : 1;
+    for (let pass = 0; pass < 2; ++pass) {  // the few that failed over the many that did not
+      for (let i = 0; i < status.length; ++i) {
+        if ((status[i] === '0') !== (pass === 0)) continue;
+        const end = i + 1 < times.length ? Math.min(times[i + 1], times[i] + 3 * typical) : times[i] + typical;
+        const x0 = plot.valToPos(times[i], 'x', true);
+        const x1 = plot.valToPos(end, 'x', true);
+        ctx.fillStyle = statusColour(+status[i]);
+        ctx.fillRect(x0, bbox.top, Math.max(1, x1 - x0 + 0.5), bbox.height);
+      }
+    }
+    ctx.restore();
+  };
+  timePlot(parent, group, {
+    label: '', height: 92, drawOver,
+    scales: {y: {range: [0, 1]}},
+    axes: [axis('time [s]', {size: 28, grid: {show: false}}), yAxis('', {values: () => [], ticks: {show: false}, grid: {show: false}})],
+    series: [{label: 'status', stroke: 'transparent', points: {show: false}, scale: 'y',
+              value: (plot, v, s, i) => (i == null ? '–' : STATUSES[+status[i]].words)}],
+    data: [times, times.map(() => 0.5)],
+  });
+}
+
+// Dark grey is lost on a dark page.
+const statusColour = (i) => (i === 5 ? theme('text') : STATUSES[i].colour);
+
+// Error against distance: a point a frame, and the RMS of each bin as a step over it.
+function scatterPlot(parent, ranges, errors, bins) {
+  const order = ranges.map((r, i) => i).filter((i) => ranges[i] != null && errors[i] != null);
+  order.sort((a, b) => ranges[a] - ranges[b]);
+  const drawBins = (plot) => {
+    const {ctx} = plot;
+    ctx.save();
+    ctx.strokeStyle = theme('text');
+    ctx.lineWidth = 2.5 * devicePixelRatio;
+    for (const bin of bins) {
+      if (bin.position_rms_m == null) continue;
+      const y = plot.valToPos(100 * bin.position_rms_m, 'y', true);
+      ctx.beginPath();
+      ctx.moveTo(plot.valToPos(bin.from_m, 'x', true), y);
+      ctx.lineTo(plot.valToPos(bin.to_m, 'x', true), y);
+      ctx.stroke();
+    }
+    ctx.restore();
+  };
+  const low = bins[0].from_m, high = bins[bins.length - 1].to_m;
+  place(parent, {
+    height: 300,
+    scales: {x: {time: false, range: [low, high]},
+             y: {range: (plot, min, max) => [0, (max || 1) * 1.05]}},
+    axes: [axis('distance camera to target [m]', {size: 28}), yAxis('position error [cm]')],
+    series: [{label: 'm', value: (plot, v) => short(v)},
+             {label: 'position error', stroke: theme('vision'), paths: () => null,
+              points: {show: true, size: 4, fill: theme('vision'), stroke: theme('vision'), width: 0}, value: (plot, v) => short(v) + ' cm'}],
+    cursor: {drag: {x: false, y: false}},
+    hooks: {draw: [drawBins]},
+  }, [order.map((i) => ranges[i]), order.map((i) => errors[i])]);
+}

@@ -1,0 +1,329 @@
+// Builds the report from the JSON in the page. Text goes in as text, never as HTML.
+'use strict';
+
+const DEG = 180 / Math.PI;
+const STATES = ['x', 'y', 'z', 'yaw', 'pitch', 'roll'];
+const isAngle = (i) => i >= 3;
+const shownScale = (i) => (isAngle(i) ? DEG : 100);  // rad to degrees, m to cm
+const shownUnit = (i) => (isAngle(i) ? '°' : 'cm');
+
+// What the paper reached at 320 x 240 and about 1 m (its figure 3.5), cm and degrees.
+const PAPER_RMS = [4.9, 2.9, 3.6, 4.4, 3.3, 1.1];
+
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name === 'style') made.style.cssText = value;
+    else if (name.startsWith('on')) made.addEventListener(name.slice(2), value);
+    else if (value != null) made.setAttribute(name, value);
+  }
+  made.append(...children.filter((child) => child != null));
+  return made;
+}
+
+const percent = (fraction, digits = 1) => (fraction == null ? '–' : (100 * fraction).toFixed(digits) + ' %');
+const signed = (value) => (value > 0 ? '+' : '') + short(value);
+const scaled = (value, scale) => (value == null ? null : value * scale);
+const cm = (metres) => short(scaled(metres, 100)) + ' cm';
+const deg = (rad) => short(scaled(rad, DEG)) + '°';
+const plural = (count, word) => `${count} ${word}${count === 1 ? '' : 's'}`;
+
+function section(title, note, ...children) {
+  return element('section', {}, element('h3', {}, title), note ? element('p', {class: 'note'}, note) : null, ...children);
+}
+
+// Numbers right, first column left; `rows` of strings or elements.
+function table(header, rows, attributes = {}) {
+  return element('div', {class: 'scroll'}, element('table', attributes,
+      element('thead', {}, element('tr', {}, ...header.map((h) => element('th', {scope: 'col'}, h)))),
+      element('tbody', {}, ...rows.map((row) => element('tr', {}, ...row.map((cell, i) =>
+          element(i ? 'td' : 'th', i ? {} : {scope: 'row'}, cell)))))));
+}
+
+function legend(items) {
+  return element('p', {class: 'legend'}, ...items.map(([swatch, words]) =>
+      element('span', {}, element('i', {style: swatch}), words)));
+}
+
+// Angles that pass +-180 degrees go on, so that no line crosses the whole plot: each is put next to `anchor`
+// where there is one, else next to the last.
+function unwrap(angles, anchor) {
+  let last = null;
+  return angles.map((angle, i) => {
+    if (angle == null) return null;
+    const near = anchor && anchor[i] != null ? anchor[i] : last;
+    last = near == null ? angle : angle + 360 * Math.round((near - angle) / 360);
+    return last;
+  });
+}
+
+// ---- the words and figures at the top ----
+
+function inWords(summary) {
+  const {detection, errors} = summary;
+  const ok = detection.counts.ok;
+  const words = [`${plural(summary.frames, 'frame')} in ${short(summary.duration_s)} s; a pose in ${ok} of them (${percent(detection.rate)}).`];
+  if (summary.comparison === 'compared') {
+    words.push(`Against navigation on ${plural(summary.compared_frames, 'frame')} the position is off by ${cm(errors.position_m.rms)} RMS` +
+               (errors.position_over_range_rms == null ? '' : `, ${percent(errors.position_over_range_rms, 2)} of the distance`) +
+               `, half of the time by less than ${cm(errors.position_m.median)}; the attitude is off by ${deg(errors.rotation_rad.rms)} RMS.`);
+  }
+  if (detection.gaps.length) {
+    const longest = detection.gaps.reduce((a, b) => (b.duration_s > a.duration_s ? b : a));
+    words.push(`The longest of ${plural(detection.gaps.length, 'gap')} is ${plural(longest.frames, 'frame')} (${short(longest.duration_s)} s) at ${short(longest.start_s)} s.`);
+  }
+  if (summary.total_us.mean != null) words.push(`A frame takes ${short(summary.total_us.mean / 1000)} ms.`);
+  return words.join(' ');
+}
+
+function tiles(summary) {
+  const {errors, consistency} = summary;
+  const all = [
+    ['detection rate', percent(summary.detection.rate), `${summary.detection.counts.ok} of ${summary.frames}`],
+    ['position RMS', errors.position_m.rms == null ? null : cm(errors.position_m.rms), `95 % below ${cm(errors.position_m.p95)}`],
+    ['over distance', errors.position_over_range_rms == null ? null : percent(errors.position_over_range_rms, 2), 'RMS of error / range'],
+    ['attitude RMS', errors.rotation_rad.rms == null ? null : deg(errors.rotation_rad.rms), `95 % below ${deg(errors.rotation_rad.p95)}`],
+    ['mean NEES', consistency.mean_nees == null ? null : short(consistency.mean_nees), '6 is honest'],
+    ['reprojection', summary.reprojection_rms_px.rms == null ? null : short(summary.reprojection_rms_px.rms) + ' px', 'RMS'],
+    ['time a frame', summary.total_us.mean == null ? null : short(summary.total_us.mean / 1000) + ' ms', `99 % below ${short(scaled(summary.total_us.p99, 1e-3))} ms`],
+  ];
+  return element('dl', {class: 'tiles'}, ...all.filter((tile) => tile[1]).map(([name, value, note]) =>
+      element('div', {}, element('dt', {}, name), element('dd', {}, value), element('small', {}, note))));
+}
+
+const WHY_NOT_COMPARED = {
+  'no navigation': 'The flight has no navigation, so there is nothing to compare with: vision alone is shown.',
+  'no world_from_pad': 'The configuration has no frames.world_from_pad, so navigation cannot be brought into the pad frame: vision alone is shown.',
+};
+
+// ---- figures ----
+
+function statePlots(flight, group) {
+  const {frames, summary} = flight;
+  const compared = frames.navigation.some((column) => column.some((v) => v != null));
+  const under = shadeGaps(frames.time_s, frames.status);
+  const grid = element('div', {class: 'six'});
+  for (const i of [0, 3, 1, 4, 2, 5]) {  // positions left, angles right, as the paper has them
+    const parent = grid.appendChild(element('figure', {}, element('figcaption', {}, STATES[i])));
+    let navigation = frames.navigation[i], vision = frames.vision[i];
+    if (isAngle(i)) {
+      navigation = unwrap(navigation);
+      vision = unwrap(vision, navigation);
+    }
+    const n = frames.time_s.length;
+    const series = [line('vision', theme('vision'), n)];
+    const data = [frames.time_s, vision];
+    if (compared) {
+      series.unshift(line('navigation', theme('navigation'), n, {width: 2, points: {show: false}}));
+      data.splice(1, 0, navigation);
+    }
+    flight.draw.push(() => timePlot(parent, group, {
+      label: `${STATES[i]} [${isAngle(i) ? '°' : 'm'}]`, series, data, drawUnder: under}));
+  }
+  const note = (compared ? 'The paper’s figure 3.4. ' : '') + 'The body in the pad frame' +
+      (compared ? ': vision over navigation. ' : ', by vision. ') + 'Shaded: frames without a pose. Drag to zoom all, double-click to see all again.';
+  return section(compared ? 'Vision and navigation' : 'Vision', note,
+      legend([[`background:${'var(--vision)'}`, 'vision'], ...(compared ? [['background:var(--navigation)', 'navigation']] : []),
+              ['background:var(--gap);height:.8em', 'no pose']]), grid);
+}
+
+function residualPlots(flight, group) {
+  const {frames} = flight;
+  const under = shadeGaps(frames.time_s, frames.status);
+  const grid = element('div', {class: 'six'});
+  for (const i of [0, 3, 1, 4, 2, 5]) {
+    const parent = grid.appendChild(element('figure', {}, element('figcaption', {}, STATES[i])));
+    const error = frames.error_cm_deg[i];
+    const sigma = frames.sigma_cm_deg[i];
+    const bound = (sign) => sigma.map((s, k) => (s == null || error[k] == null ? null : sign * 2 * s));
+    const none = {stroke: 'transparent', points: {show: false}};
+    flight.draw.push(() => timePlot(parent, group, {
+      label: `${STATES[i]} error [${shownUnit(i)}]`, drawUnder: under,
+      series: [Object.assign({label: '+2σ', value: (p, v) => short(v)}, none), Object.assign({label: '−2σ', value: (p, v) => short(v)}, none),
+               line('error', theme('vision'), frames.time_s.length)],
+      bands: [{series: [1, 2], fill: theme('band')}],
+      data: [frames.time_s, bound(1), bound(-1), error],
+    }));
+  }
+  return section('Residuals', 'Vision minus navigation. The band is ± 2 σ of vision’s own covariance: 95 % of the errors belong in it. A line beside zero is a DC offset: calibration, not noise.',
+      legend([['background:var(--vision)', 'error'], ['background:var(--band);height:.8em', '± 2 σ as vision claims']]), grid);
+}
+
+// The paper's figure 3.5 as bars in HTML: they print and fit any width.
+function rmsBars(summary) {
+  const half = (states) => {
+    const values = states.map((i) => [scaled(summary.errors[STATES[i]].rms, shownScale(i)),
+                                      scaled(summary.errors[STATES[i]].rms_without_dc_offset, shownScale(i))]);
+    const most = Math.max(...values.flat(), ...states.map((i) => PAPER_RMS[i]));
+    const width = (value) => `width:${(100 * value / most).toFixed(2)}%`;
+    return element('div', {class: 'bars'}, ...states.flatMap((i, k) => [
+      element('b', {}, STATES[i]),
+      element('div', {class: 'bar'},
+          element('div', {class: 'paper', style: width(PAPER_RMS[i])}, element('span', {}, `paper ${PAPER_RMS[i]} ${shownUnit(i)}`)),
+          element('div', {class: 'rms', style: width(values[k][0])}), element('div', {class: 'noise', style: width(values[k][1])})),
+      element('span', {class: 'values'}, element('b', {}, `${short(values[k][0])} ${shownUnit(i)}`),
+          element('small', {}, `${short(values[k][1])} without DC`)),
+    ]));
+  };
+  return section('RMS error of each state', 'The paper’s figure 3.5. Its own values, from a 320 × 240 camera about 1 m above the pad, stand faint behind.',
+      legend([['background:var(--vision);height:.7em', 'RMS'], ['background:var(--navigation);height:.7em', 'RMS without the DC offset'],
+              ['background:var(--paper);height:.9em', 'the paper']]),
+      element('div', {class: 'halves'}, half([0, 1, 2]), half([3, 4, 5])));
+}
+
+function errorTable(summary) {
+  const rows = STATES.map((state, i) => {
+    const e = summary.errors[state], s = shownScale(i), unit = ' ' + shownUnit(i);
+    return [state, short(scaled(e.rms, s)) + unit, signed(scaled(e.dc_offset, s)) + unit, short(scaled(e.rms_without_dc_offset, s)) + unit,
+            short(scaled(e.median, s)) + unit, short(scaled(e.p95, s)) + unit, short(scaled(e.max, s)) + unit];
+  });
+  const size = (name, e, shown) => [name, shown(e.rms), '', '', shown(e.median), shown(e.p95), shown(e.max)];
+  rows.push(size('position', summary.errors.position_m, cm), size('attitude', summary.errors.rotation_rad, deg));
+  return section('Errors and DC offsets', 'The DC offset is the mean of vision minus navigation, what the paper’s calc_dc_offset removes: mount, intrinsics or pad place that are off. Median, 95th percentile and largest are of absolute values.',
+      table(['', 'RMS', 'DC offset', 'RMS without it', 'median', '95 %', 'largest'], rows));
+}
+
+function distances(flight) {
+  const {summary, frames} = flight;
+  const parent = element('figure', {class: 'wide'});
+  flight.draw.push(() => scatterPlot(parent, frames.range_m, frames.position_error_cm, summary.distance_bins));
+  return section('Error against distance', null,
+      legend([['background:var(--vision);width:.5em;height:.5em;border-radius:50%', 'a frame'], ['background:var(--text)', 'RMS of a bin']]), parent,
+      table(['distance', 'frames', 'position RMS', 'median', 'attitude RMS'], summary.distance_bins.map((b) =>
+          [`${+b.from_m.toPrecision(6)} – ${+b.to_m.toPrecision(6)} m`, String(b.frames), cm(b.position_rms_m), cm(b.position_median_m), deg(b.rotation_rms_rad)])));
+}
+
+function detectionTimeline(flight, group) {
+  const {summary, frames} = flight;
+  const {counts, gaps} = summary.detection;
+  const parent = element('figure', {class: 'wide strip'});
+  flight.draw.push(() => statusStrip(parent, group, frames.time_s, frames.status));
+  const present = STATUSES.map((s, i) => [`background:${i === 5 ? 'var(--text)' : s.colour};height:.8em`, `${s.words} ${counts[s.name]}`, counts[s.name]])
+      .filter((item) => item[2]);
+  const reasons = (gap) => Object.entries(gap.reasons).map(([name, n]) => `${name.replace('_', ' ')} ${n}`).join(', ');
+  const longest = [...gaps].sort((a, b) => b.frames - a.frames).slice(0, 20).sort((a, b) => a.first_frame - b.first_frame);
+  return section('Detection', gaps.length ? null : 'Every frame has a pose.', legend(present), parent,
+      gaps.length > longest.length ? element('p', {class: 'note'}, `The ${longest.length} longest of ${gaps.length} gaps:`) : null,
+      gaps.length ? table(['gap at', 'first frame', 'frames', 'length', 'reasons'], longest.map((g) =>
+          [`${g.start_s.toFixed(3)} s`, String(g.first_frame), String(g.frames), `${g.duration_s.toFixed(3)} s`, reasons(g)]), {class: 'reasons'}) : null);
+}
+
+function consistencyPlot(flight, group) {
+  const {summary, frames} = flight;
+  const c = summary.consistency;
+  const parent = element('figure', {class: 'wide'});
+  const constant = (value) => frames.time_s.map(() => value);
+  const dashed = (label, dash) => ({label, stroke: theme('muted'), width: 1, dash, points: {show: false}, value: (p, v) => short(v)});
+  flight.draw.push(() => timePlot(parent, group, {
+    label: 'NEES', height: 230,
+    scales: {y: {distr: 3}},
+    drawUnder: shadeGaps(frames.time_s, frames.status),
+    series: [dashed('2.5 %', [2, 4]), dashed('97.5 %', [2, 4]), dashed('expected', [8, 4]),
+             line('NEES', theme('vision'), frames.time_s.length)],
+    data: [frames.time_s, constant(1.2373), constant(14.4494), constant(6), frames.nees.map((v) => (v > 0 ? v : null))],
+  }));
+  const [low, high] = c.mean_nees_bounds_95;
+  const verdict = c.mean_nees > high ? 'vision is less accurate than it claims, or navigation is.' : c.mean_nees < low ? 'vision is more accurate than it claims.' : 'as honest as it can be told.';
+  return section('Consistency', `Mean NEES ${short(c.mean_nees)} over ${plural(c.count ?? c.frames, 'frame')}; an honest covariance gives 6, with independent frames within ${short(low)} to ${short(high)} 95 times of 100: ${verdict} Within the single frame’s bounds, 1.24 to 14.4: ${percent(c.fraction_of_frames_inside_95)} (95 % when honest). Navigation’s own noise is not in it.`, parent);
+}
+
+function stageTable(summary) {
+  const stages = summary.stages;
+  const most = Math.max(...stages.map((s) => s.share || 0), 1e-9);
+  const bar = (share) => element('span', {class: 'share'}, element('i', {style: `width:${(100 * share / most).toFixed(1)}%`}), percent(share));
+  const rows = stages.map((s) => [s.stage, short(s.mean_us), short(s.median_us), short(s.p99_us), String(s.frames), bar(s.share)]);
+  const t = summary.total_us;
+  rows.push(['total', short(t.mean), short(t.median), short(t.p99), '', percent(1)]);
+  return section('Cost of each stage', 'The paper’s table 3.2; there segmentation and threshold took 72 % and all image processing 90 % of 33 ms on a 233 MHz Pentium. Mean, median and 99 % are of the frames in which a stage ran.',
+      table(['stage', 'mean µs', 'median µs', '99 % µs', 'frames', 'share of the total'], rows, {class: 'stages'}));
+}
+
+function pictureStrip(pictures, compared) {
+  return section('Pictures', `The recovered outline (orange) and the measured points (blue) in the best, the median and the worst frame by ${compared ? 'position error' : 'reprojection error'}, and in the longest gap.`,
+      element('div', {class: 'pictures'}, ...pictures.map((p) => {
+        const facts = [];
+        if (p.range_m != null) facts.push(`${short(p.range_m)} m away`);
+        if (p.position_error_cm != null) facts.push(`off by ${short(p.position_error_cm)} cm, ${short(p.rotation_error_deg)}°`);
+        if (p.reprojection_px != null) facts.push(`reprojection ${short(p.reprojection_px)} px`);
+        if (p.status !== 'ok') facts.push(p.status.replace('_', ' '));
+        return element('figure', {}, element('img', {src: 'data:image/jpeg;base64,' + p.jpeg, alt: `frame ${p.frame} with the recovered target`}),
+            element('figcaption', {}, element('b', {}, p.why), ` frame ${p.frame}${p.name ? ', ' + p.name : ''}`, element('br'), facts.join(' · ')));
+      })));
+}
+
+function problemList(problems) {
+  const shown = problems.slice(0, 200);
+  return section('Problems met', problems.length ? null : 'None.',
+      problems.length ? element('ul', {class: 'problems'}, ...shown.map((p) => element('li', {}, p))) : null,
+      problems.length > shown.length ? element('p', {class: 'note'}, `and ${problems.length - shown.length} more, all in summary.json`) : null);
+}
+
+// ---- the page ----
+
+function flightPage(flight, index) {
+  const {summary, pictures, frames} = flight;
+  flight.draw = [];
+  const group = new TimeGroup('flight' + index);
+  const compared = summary.comparison === 'compared';
+  const page = element('article', {},
+      element('h2', {}, summary.flight || 'flight', summary.target ? element('small', {}, summary.target) : null),
+      element('p', {class: 'lead'}, inWords(summary)),
+      compared ? null : element('p', {class: 'notice'}, WHY_NOT_COMPARED[summary.comparison] || `Nothing to compare with: ${summary.comparison}. Vision alone is shown.`),
+      tiles(summary));
+  if (frames.time_s.length) page.append(statePlots(flight, group), detectionTimeline(flight, group));
+  if (compared) page.append(rmsBars(summary), errorTable(summary), residualPlots(flight, group), distances(flight));
+  if (summary.consistency.mean_nees != null) page.append(consistencyPlot(flight, group));
+  if (summary.stages.length) page.append(stageTable(summary));
+  if (pictures.length) page.append(pictureStrip(pictures, compared));
+  page.append(problemList(summary.problems));
+  return page;
+}
+
+function overview(flights, choose) {
+  const rows = flights.map(({summary}, i) => {
+    const e = summary.errors;
+    const name = element('a', {href: '#' + i, onclick: (event) => { event.preventDefault(); choose(i); }}, summary.flight || `flight ${i}`);
+    return [name, String(summary.frames), percent(summary.detection.rate), cm(e.position_m.rms), percent(e.position_over_range_rms, 2), deg(e.rotation_rad.rms),
+            short(summary.consistency.mean_nees), short(scaled(summary.total_us.mean, 1e-3)) + ' ms', String(summary.problems.length)];
+  });
+  return section(plural(flights.length, 'flight'), null,
+      table(['flight', 'frames', 'with a pose', 'position RMS', 'over distance', 'attitude RMS', 'mean NEES', 'time a frame', 'problems'], rows, {class: 'overview'}));
+}
+
+function main() {
+  const root = document.getElementById('report');
+  const sources = [...document.querySelectorAll('script.flight')];
+  const configuration = JSON.parse(document.getElementById('configuration').textContent);
+  const parsed = sources.map((source) => JSON.parse(source.textContent));
+  root.append(element('header', {}, element('h1', {}, 'Perch flight report')));
+  const place = element('div');
+  let shown = 0;
+
+  const show = (index) => {
+    shown = index;
+    place.querySelectorAll('figure').forEach((figure) => figure.dispatchEvent(new Event('perch-remove')));
+    const flight = parsed[index];
+    place.replaceChildren(flightPage(flight, index));
+    for (const draw of flight.draw) draw();
+    root.querySelectorAll('.overview tbody tr').forEach((row, i) => row.classList.toggle('chosen', i === index));
+  };
+  const choose = (index) => {
+    history.replaceState(null, '', '#' + index);
+    show(index);
+    place.scrollIntoView({behavior: 'smooth'});
+  };
+
+  if (parsed.length > 1) root.append(overview(parsed, choose));
+  root.append(place);
+  if (configuration) root.append(element('details', {}, element('summary', {}, 'Configuration'), element('pre', {}, configuration)));
+  if (!parsed.length) return place.append(element('p', {class: 'notice'}, 'No flight.'));
+
+  const wanted = parseInt(location.hash.slice(1), 10);
+  show(wanted >= 0 && wanted < parsed.length ? wanted : 0);
+  // Plots have their colours painted in: a new scheme needs new plots. Paper is always white.
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => show(shown));
+  addEventListener('beforeprint', () => { document.documentElement.classList.add('paper-page'); show(shown); });
+  addEventListener('afterprint', () => { document.documentElement.classList.remove('paper-page'); show(shown); });
+}
+
+main();
