@@ -42,6 +42,7 @@ int run(const perch::CommandLine& line) {
   if (FLAGS_output.empty()) throw perch::UsageError("--output: expected a file to write, found nothing");
   // Below 10 a module is hardly a pixel; no printer resolves more than 4800.
   if (!(FLAGS_dpi >= 10 && FLAGS_dpi <= 4800)) throw perch::UsageError("--dpi: expected 10 to 4800");
+  if (FLAGS_bare && FLAGS_paper != "none") throw perch::UsageError("--bare: a bare target has no paper");
   const perch::PrintOptions options{paper_of(FLAGS_paper), FLAGS_dpi, FLAGS_bare};
   try {
     const perch::LandingTarget target = perch::read_target(line.arguments.front());

@@ -105,6 +105,13 @@ void print_help(const Program& program) {
   print_flag("--version", "the version");
 }
 
+// What was printed counts as work: a full disk behind stdout is a failure.
+int flushed(int code) {
+  std::cout.flush();
+  if (!std::cout) throw std::runtime_error("standard output: cannot be written");
+  return code;
+}
+
 bool asks_for(int argc, char** argv, std::initializer_list<std::string_view> names) {
   for (int i = 1; i < argc && std::string_view(argv[i]) != "--"; ++i) {
     if (std::find(names.begin(), names.end(), argv[i]) != names.end()) return true;
@@ -131,13 +138,13 @@ int run_program(int argc, char** argv, const Program& program,
   try {
     if (asks_for(argc, argv, {"--help", "-help", "-h"})) {
       print_help(program);
-      return 0;
+      return flushed(0);
     }
     if (asks_for(argc, argv, {"--version", "-version"})) {
       std::cout << program.name << ' ' << PERCH_VERSION << '\n';
-      return 0;
+      return flushed(0);
     }
-    return work(parse(argc, argv));
+    return flushed(work(parse(argc, argv)));
   } catch (const UsageError& e) {
     print_error(e.what());
     std::cerr << "usage: " << program.name << ' ' << program.synopsis << "; more with --help\n";

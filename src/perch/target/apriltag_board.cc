@@ -87,8 +87,9 @@ Tag read_tag(Section& entry, const apriltag_family_t& family) {
   std::vector<double> centre{0, 0};
   entry.read("center", centre, 2, Range{-kPrintable.max, kPrintable.max});
   tag.centre = {centre[0], centre[1]};
-  // A number of turns that needs more is one in degrees.
-  entry.read("yaw", tag.yaw, Range{-2 * M_PI, 2 * M_PI});
+  entry.read("yaw", tag.yaw);
+  if (std::abs(tag.yaw) > 2 * M_PI)
+    entry.fail("yaw", "an angle in rad, a turn (6.28) at most");  // not degrees
   entry.done();
   return tag;
 }

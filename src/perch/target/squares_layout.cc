@@ -89,8 +89,7 @@ struct NestedCell {
   double hole = 0, inner = 0;
 };
 
-NestedCell read_nested(Section& section, const std::vector<Cell>& cells) {
-  Section nested = section.section("nested");
+NestedCell read_nested(Section& nested, const std::vector<Cell>& cells) {
   NestedCell result;
   nested.read("in", result.in);
   const auto outer =
@@ -168,8 +167,8 @@ void read_squares(Section& section, LandingTarget& target) {
   }
   add_target(layout, target.size, 1, Eigen::Vector2d::Zero(), target);
 
-  if (section.has("nested")) {
-    const NestedCell nested = read_nested(section, cells);
+  if (Section inner = section.section("nested"); !inner.keys().empty()) {
+    const NestedCell nested = read_nested(inner, cells);
     check_names(section, cells);
     const Eigen::Vector2d centre = from_modules(nested.column, nested.row);
     layout.nested = Nested{nested.in, centre, nested.hole * module, nested.inner * module};
