@@ -1,0 +1,180 @@
+#include "perch/target/draw.h"
+
+#include <functional>
+
+#include "support/rng.h"
+#include "target/raster.h"
+
+namespace perch {
+namespace {
+
+const std::filesystem::path kTargets = std::filesystem::path(PERCH_SOURCE_DIR) / "configs" / "targets";
+
+// A page as a grey picture.
+class PageRaster {
+ public:
+  PageRaster(const Size& page, double per_mm, const std::function<void(cairo_t*)>& draw)
+      : per_mm_(per_mm),
+        surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(page.width * per_mm),
+                                            static_cast<int>(page.height * per_mm))) {
+    cairo_t* cr = cairo_create(surface_);
+    cairo_set_source_rgb(cr, 1, 1, 1);
+    cairo_paint(cr);
+    cairo_scale(cr, per_mm, per_mm);
+    draw(cr);
+    EXPECT_EQ(cairo_status(cr), CAIRO_STATUS_SUCCESS);
+    cairo_destroy(cr);
+    cairo_surface_flush(surface_);
+  }
+  ~PageRaster() { cairo_surface_destroy(surface_); }
+  PageRaster(const PageRaster&) = delete;
+  PageRaster& operator=(const PageRaster&) = delete;
+
+  int width() const { return cairo_image_surface_get_width(surface_); }
+  int height() const { return cairo_image_surface_get_height(surface_); }
+  int pixel(int x, int y) const {
+    return cairo_image_surface_get_data(surface_)[y * cairo_image_surface_get_stride(surface_) + 4 * x];
+  }
+  int at_mm(double x, double y) const {
+    return pixel(static_cast<int>(x * per_mm_), static_cast<int>(y * per_mm_));
+  }
+
+ private:
+  double per_mm_;
+  cairo_surface_t* surface_;
+};
+
+TEST(Draw, AModuleIsSizeOverModulesToAFractionOfAPixel) {
+  // 100 dpi is no whole number of pixels a module: an edge's place shows in the grey of its pixel.
+  const double per_metre = 100 / 0.0254;
+  const Raster raster = raster_of(read_target(kTargets / "sharp.yaml"), per_metre, 0, 1);
+  const auto black_length = [&](double x0, double x1, double y) {
+    const int row = static_cast<int>(raster.pixel({0, y}).y());
+    double sum = 0;
+    for (int x = static_cast<int>(raster.pixel({x0, 0}).x()); x < static_cast<int>(raster.pixel({x1, 0}).x());
+         ++x) {
+      sum += 1 - raster.grey[static_cast<size_t>(row * raster.width + x)] / 255.0;
+    }
+    return sum / per_metre;
+  };
+  // cairo's 256 levels of coverage along a row: two edges, rounded to 1/256 pixel of 0.25 mm each, and to a
+  // grey level of 255: 0.004 mm.
+  EXPECT_NEAR(black_length(-0.5, 0.5, -0.3), 0.7, 4e-6);   // the interior: 14 modules
+  EXPECT_NEAR(black_length(-0.2, 0.0, -0.2), 0.1, 4e-6);   // between D and E: 2 modules
+  EXPECT_NEAR(black_length(-0.5, -0.2, -0.2), 0.1, 4e-6);  // between border and D: 2 modules
+}
+
+TEST(Draw, NeighbouringModulesOfATagShowNoSeam) {
+  // 23.7 px a tag: no module begins with a pixel. Between white neighbours in a row of data, and between
+  // rows, all must be white: tag36h11's id 0 has a white block of 2 x 2 modules; look for any seam in all of
+  // it.
+  const LandingTarget target =
+      read_target(Section::parse("type: apriltag\nfamily: tag36h11\ntags: [{id: 0, size: 0.8}]\n", "t.yaml"));
+  const Raster raster = raster_of(target, 237 / 0.8, 0, 1);
+  const Raster doubled = raster_of(target, 16 / 0.8, 0, 1);  // two whole pixels a module: no grey at all
+  for (const uint8_t grey : doubled.grey) EXPECT_TRUE(grey == 0 || grey == 255) << int{grey};
+  for (int row = 1; row + 1 < 20; ++row) {
+    for (int column = 1; column + 1 < 20; ++column) {
+      // A point at the corner of four pixels of one colour is inside that colour.
+      const auto at = [&](int r, int c) { return doubled.grey[static_cast<size_t>(r * doubled.width + c)]; };
+      if (at(row, column) != at(row - 1, column) || at(row, column) != at(row, column - 1) ||
+          at(row, column) != at(row - 1, column - 1)) {
+        continue;
+      }
+      const double module = 0.8 / 8;
+      const Eigen::Vector2d p(-0.5 + column * module / 2, 0.5 - row * module / 2);
+      EXPECT_EQ(raster.at(p), at(row, column)) << row << ' ' << column;
+    }
+  }
+}
+
+TEST(Draw, TilesShowTheTargetOnceAndInPlace) {
+  const LandingTarget target = read_target(kTargets / "nested.yaml");
+  const SheetPlan plan = plan_sheets(printed_bounds(target), Paper::kA4);
+  const Raster whole = raster_of(target, 1000, 0.0);
+  TestRng rng;
+  for (size_t i = 0; i < plan.sheets.size(); ++i) {
+    const Sheet& sheet = plan.sheets[i];
+    const PageRaster page(plan.page, 4, [&](cairo_t* cr) { draw_sheet(cr, target, plan, i); });
+    for (int n = 0; n < 200; ++n) {
+      const double x = rng.uniform(0.5, sheet.window_size.width - 0.5);
+      const double y = rng.uniform(0.5, sheet.window_size.height - 0.5);
+      const Eigen::Vector2d p = (sheet.drawing + Eigen::Vector2d(x, -y)) / 1000;
+      if (p.cwiseAbs().maxCoeff() > 0.499) continue;  // off the target, or on its cut line
+      const int expected = whole.at(p), found = page.at_mm(sheet.window.x() + x, sheet.window.y() + y);
+      // Pixels on an edge are grey in both pictures and differ.
+      if (expected != 0 && expected != 255) continue;
+      if (found != 0 && found != 255) continue;
+      const bool near_edge =
+          std::abs(std::remainder(p.x(), 0.05)) < 1e-3 || std::abs(std::remainder(p.y(), 0.05)) < 1e-3;
+      const bool near_inner = p.x() > 0.04 && p.x() < 0.21 && p.y() > 0.04 && p.y() < 0.21;
+      if (near_edge || near_inner) continue;
+      EXPECT_EQ(found, expected) << tile_name(sheet) << " at " << p.transpose();
+    }
+  }
+}
+
+TEST(Draw, NoInkReachesThePageMargin) {
+  for (const char* file : {"sharp.yaml", "aprilgrid_6x6.yaml"}) {
+    const LandingTarget target = read_target(kTargets / file);
+    for (const Paper paper : {Paper::kA4, Paper::kLetter}) {
+      const SheetPlan plan = plan_sheets(printed_bounds(target), paper);
+      const auto expect_white_margin = [&](const PageRaster& page) {
+        // A line on the edge reaches half its width out.
+        const int margin = static_cast<int>((kPageMargin - 0.5) * 2);
+        int inked = 0;
+        for (int y = 0; y < page.height(); ++y) {
+          for (int x = 0; x < page.width(); ++x) {
+            const bool in_margin = std::min({x, y, page.width() - 1 - x, page.height() - 1 - y}) < margin;
+            inked += in_margin && page.pixel(x, y) != 255 ? 1 : 0;
+          }
+        }
+        EXPECT_EQ(inked, 0) << file;
+      };
+      expect_white_margin(PageRaster(plan.page, 2, [&](cairo_t* cr) { draw_overview(cr, target, plan); }));
+      for (size_t i = 0; i < plan.sheets.size(); ++i) {
+        expect_white_margin(PageRaster(plan.page, 2, [&](cairo_t* cr) { draw_sheet(cr, target, plan, i); }));
+      }
+    }
+  }
+}
+
+TEST(Draw, WhiteOnWhiteShowsWhereToCut) {
+  const LandingTarget target =
+      read_target(Section::parse("size: 0.1\nmodules: 9\nborder: 1\nsquares: {A: [4, 4, 1]}\n", "t.yaml"));
+  const SheetPlan plan = plan_sheets(printed_bounds(target), Paper::kNone);
+  const double per_mm = 10;
+  const Sheet& sheet = plan.sheets[0];
+  const PageRaster page(plan.page, per_mm, [&](cairo_t* cr) { draw_sheet(cr, target, plan, 0); });
+  const double left = sheet.window.x() + kMarkMargin, top = sheet.window.y() + kMarkMargin;
+  // The hairline is one pixel, just outside the target; within is the border's white.
+  EXPECT_LT(page.at_mm(left - 0.05, top + 30), 200);
+  EXPECT_EQ(page.at_mm(left + 0.15, top + 30), 255);
+  EXPECT_EQ(page.at_mm(left - 0.25, top + 30), 255);
+  EXPECT_LT(page.at_mm(left + 30, top - 0.05), 200);
+  // A mark in line with the edge, a millimetre away from the corner.
+  EXPECT_LT(page.at_mm(left - 3, top), 200);
+  EXPECT_LT(page.at_mm(left, top - 3), 200);
+}
+
+TEST(Draw, RulersAreAHundredMillimetresInBothDirections) {
+  const LandingTarget target = read_target(kTargets / "sharp.yaml");
+  const SheetPlan plan = plan_sheets(printed_bounds(target), Paper::kA4);
+  const PageRaster page(plan.page, 10, [&](cairo_t* cr) { draw_sheet(cr, target, plan, 0); });
+  const auto dark_run = [&](int x, int y, int dx, int dy) {  // from the first dark pixel to the last, mm
+    int first = -1, last = -1;
+    for (int n = 0; x < page.width() && y < page.height(); ++n, x += dx, y += dy) {
+      if (page.pixel(x, y) > 200) continue;
+      if (first < 0) first = n;
+      last = n;
+    }
+    return (last - first + 1) / 10.0;
+  };
+  // The end ticks add half a line of 0.1 mm each, and grey pixels up to two more of 0.1 mm.
+  const int bottom = static_cast<int>((plan.page.height - kPageMargin - 0.7) * 10);
+  EXPECT_NEAR(dark_run(0, bottom, 1, 0), 100.1, 0.2);
+  EXPECT_NEAR(dark_run(static_cast<int>((kPageMargin + 0.7) * 10), 0, 0, 1), 100.1, 0.2);
+}
+
+}  // namespace
+}  // namespace perch
