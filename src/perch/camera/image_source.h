@@ -34,12 +34,18 @@ class ImageSource {
   std::vector<std::string> problems_;
 };
 
-// Opens what `camera.source` names: flight:FOLDER, images:GLOB, video:FILE (and from later work v4l2:, gst:,
-// sim:). Throws std::runtime_error naming what cannot be opened and why.
+// Opens what `camera.source` names; throws std::runtime_error naming what cannot be opened and why.
+//   flight:FOLDER  the rows of mav0/cam0/data.csv; rows without a usable time are skipped and noted
+//   images:GLOB    2.png before 10.png; names of 10 digits or more are times in ns, else 30 Hz from 0
+//   video:FILE     through FFmpeg, with the file's own times from 0
+// Silences OpenCV's log: what is wrong with a picture is in its frame.
 std::unique_ptr<ImageSource> open_image_source(const std::string& source, Channel channel = Channel::kGrey);
 
 // Reads one picture as `Frame::grey`: 8 or 16 bits, grey or colour, with an alpha or not. Sets `problem` and
-// leaves `grey` empty when the file is missing, empty, truncated or no picture.
+// leaves `grey` empty when the file is missing, empty, truncated, too large or no picture. Grey of colour is
+// BT.601's; an alpha is ignored, and so is a rotation in the EXIF data, since the lens model is that of the
+// sensor. 16 bits become 8 by a shift of as many bits as the picture uses (10, 12, 14, 16) beyond 8: cameras
+// of 12 bits store them in the lower end of 16. Pictures of more than 50 million pixels are refused.
 void read_picture(const std::filesystem::path& file, Channel channel, Frame& frame);
 
 }  // namespace perch

@@ -21,11 +21,11 @@ struct GimbalSample {
 // A recorded flight, an ASL (EuRoC) folder, without its pictures: those come from
 // open_image_source("flight:" + folder). See docs/FORMATS.md.
 struct Flight {
-  std::filesystem::path folder;  // FLIGHT, the folder that holds mav0
-  std::string name;              // its last part
-  std::optional<CameraModel> camera;      // camera.cameramodel, else sensor.yaml; absent when neither can be read
-  std::optional<Rigid3> body_from_camera; // sensor.yaml's T_BS
-  NavTrack nav;                  // nav0, else state_groundtruth_estimate0; empty when there is neither
+  std::filesystem::path folder;       // FLIGHT, the folder that holds mav0
+  std::string name;                   // its last part
+  std::optional<CameraModel> camera;  // camera.cameramodel, else sensor.yaml; absent when neither can be read
+  std::optional<Rigid3> body_from_camera;  // sensor.yaml's T_BS
+  NavTrack nav;  // nav0, else state_groundtruth_estimate0; empty when there is neither
   std::vector<GimbalSample> gimbal;
   std::vector<std::string> problems;  // "file:line: what", each thing that was skipped
 };

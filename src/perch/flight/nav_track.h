@@ -20,12 +20,14 @@ struct NavSample {
 struct NavTrack {
   std::vector<NavSample> samples;
 
-  // The pose at a moment of the navigation clock: between two samples by interpolation (none when they are more
-  // than kMaxGap apart), beyond the ends by the last velocity for at most kMaxExtrapolation. Empty otherwise.
+  // The pose at a moment of the navigation clock: between two samples by interpolation (none when they are
+  // more than kMaxGap apart), beyond the ends by the last velocity for at most kMaxExtrapolation. Empty
+  // otherwise.
   std::optional<NavSample> at(int64_t timestamp_ns) const;
 
   static constexpr double kMaxExtrapolation = 0.05;  // s; FORMATS: never more than 50 ms
-  // Linear interpolation of a vehicle that accelerates with 2 m/s^2 over a gap T is off by 2 T^2 / 8: 6 cm at 0.5 s.
+  // Linear interpolation of a vehicle that accelerates with 2 m/s^2 over a gap T is off by 2 T^2 / 8: 6 cm at
+  // 0.5 s.
   static constexpr double kMaxGap = 0.5;  // s
 };
 

@@ -1,0 +1,127 @@
+#include "perch/flight/read_nav.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "perch/camera/clock_order.h"
+#include "perch/camera/csv.h"
+
+namespace perch {
+
+namespace {
+
+constexpr std::array<ColumnName, 11> kNavColumns{
+    "timestamp [ns]", "p_x [m]",   "p_y [m]",  "p_z [m]", "q_w", "q_x", "q_y", "q_z",
+    "v_x [m/s]",      "v_y [m/s]", "v_z [m/s]"};
+constexpr std::array<ColumnName, 11> kEurocColumns{
+    "timestamp [ns]",    "p_RS_R_x [m]",      "p_RS_R_y [m]",     "p_RS_R_z [m]",
+    "q_RS_w []",         "q_RS_x []",         "q_RS_y []",        "q_RS_z []",
+    "v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]"};
+constexpr std::array<ColumnName, 4> kGimbalColumns{"timestamp [ns]", "pan [rad]", "tilt [rad]", "zoom []"};
+
+constexpr size_t kPoseColumns = 8;  // the velocities, which may be missing, come after them
+
+// The row's time and numbers (NaN where there is none from `required` on), or why it has none.
+std::string read_row(const CsvReader& csv, std::span<const ColumnName> names, std::span<const size_t> columns,
+                     size_t required, int64_t& time, std::span<double> numbers) {
+  const auto fields = csv.fields();
+  const auto field = [&](size_t i) {
+    return columns[i] < fields.size() ? fields[columns[i]] : std::string_view{};
+  };
+  const auto found = [&](size_t i) { return ", found \"" + std::string(field(i)) + "\", row skipped"; };
+  const auto integer = parse_integer(field(0));
+  if (!integer) return "timestamp: expected whole nanoseconds" + found(0);
+  time = *integer;
+  for (size_t i = 1; i < columns.size(); ++i) {
+    const auto number = parse_finite(field(i));
+    if (!number && i < required) return std::string(names[i]) + ": expected a number" + found(i);
+    numbers[i - 1] = number.value_or(std::numeric_limits<double>::quiet_NaN());
+  }
+  return "";
+}
+
+// Fills velocities that the file has not: the slope of the positions around.
+size_t fill_velocities(std::vector<NavSample>& samples) {
+  size_t filled = 0;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i].body_velocity_in_world.allFinite()) continue;
+    ++filled;
+    const NavSample& before = samples[i > 0 ? i - 1 : i];
+    const NavSample& after = samples[i + 1 < samples.size() ? i + 1 : i];
+    const double dt =
+        (static_cast<double>(after.timestamp_ns) - static_cast<double>(before.timestamp_ns)) * 1e-9;
+    if (dt > 0) {
+      samples[i].body_velocity_in_world =
+          (after.world_from_body.translation - before.world_from_body.translation) / dt;
+    } else {
+      samples[i].body_velocity_in_world.setZero();
+    }
+  }
+  return filled;
+}
+
+}  // namespace
+
+NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& problems) {
+  CsvReader csv(file);
+  const bool euroc = csv.has_column(kEurocColumns[1]);
+  std::span<const ColumnName> names = euroc ? kEurocColumns : kNavColumns;
+  const bool has_header = csv.has_column(names[1]);
+  if (has_header && !csv.has_column(names[kPoseColumns])) names = names.first(kPoseColumns);
+  const std::vector<size_t> columns = csv.columns(names);
+
+  std::vector<NavSample> samples;
+  std::vector<std::string> places;
+  while (csv.next()) {
+    NavSample sample;
+    std::array<double, 10> n;
+    n.fill(std::numeric_limits<double>::quiet_NaN());
+    const std::string problem = read_row(csv, names, columns, kPoseColumns, sample.timestamp_ns, n);
+    if (!problem.empty()) {
+      problems.push_back(csv.place() + ": " + problem);
+      continue;
+    }
+    const Eigen::Quaterniond rotation(n[3], n[4], n[5], n[6]);
+    if (!(rotation.norm() > 1e-3 && rotation.norm() < 1e3)) {
+      problems.push_back(csv.place() +
+                         ": q_w q_x q_y q_z: expected a rotation, found a quaternion of length " +
+                         std::to_string(rotation.norm()) + ", row skipped");
+      continue;
+    }
+    sample.world_from_body = {positive_w(rotation.normalized()), {n[0], n[1], n[2]}};
+    sample.body_velocity_in_world = {n[7], n[8], n[9]};
+    samples.push_back(sample);
+    places.push_back(csv.place());
+  }
+  NavTrack track{in_time_order(std::move(samples), places, problems)};
+  if (const size_t filled = fill_velocities(track.samples)) {
+    problems.push_back(file.string() + ": " + std::to_string(filled) +
+                       " rows without a velocity, taken from the positions");
+  }
+  return track;
+}
+
+std::vector<GimbalSample> read_gimbal(const std::filesystem::path& file, std::vector<std::string>& problems) {
+  CsvReader csv(file);
+  const std::vector<size_t> columns = csv.columns(kGimbalColumns);
+  std::vector<GimbalSample> samples;
+  std::vector<std::string> places;
+  while (csv.next()) {
+    GimbalSample sample;
+    std::array<double, 3> n{};
+    const std::string problem =
+        read_row(csv, kGimbalColumns, columns, kGimbalColumns.size(), sample.timestamp_ns, n);
+    if (!problem.empty()) {
+      problems.push_back(csv.place() + ": " + problem);
+      continue;
+    }
+    sample.pan = n[0], sample.tilt = n[1], sample.zoom = n[2];
+    samples.push_back(sample);
+    places.push_back(csv.place());
+  }
+  return in_time_order(std::move(samples), places, problems);
+}
+
+}  // namespace perch
