@@ -1,0 +1,183 @@
+#include "perch/simulation/flight_folder.h"
+
+#include <cinttypes>
+#include <cstdarg>
+#include <cstdio>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+namespace perch {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr char kMark[] = "# Written by perch-simulate";
+
+std::string format(const char* pattern, ...) __attribute__((format(printf, 1, 2)));
+std::string format(const char* pattern, ...) {
+  char text[512];
+  va_list arguments;
+  va_start(arguments, pattern);
+  vsnprintf(text, sizeof text, pattern, arguments);
+  va_end(arguments);
+  return text;
+}
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+bool is_ours(const fs::path& folder) {
+  std::ifstream stream(folder / "simulation.yaml");
+  std::string line;
+  return std::getline(stream, line) && line == kMark;
+}
+
+// 17 digits: what is read back is what was, to the last bit.
+std::string numbers(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + format("%.17g", value);
+  return text;
+}
+
+std::string point_and_quaternion(const Rigid3& pose) {
+  const Eigen::Vector3d& p = pose.translation;
+  const Eigen::Quaterniond q = positive_w(pose.rotation);
+  return format("%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g", p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z());
+}
+
+std::string velocity(const Eigen::Vector3d& v) { return format("%.17g,%.17g,%.17g", v.x(), v.y(), v.z()); }
+
+std::string sensor_yaml(const Simulation& simulation) {
+  const CameraModel& camera = simulation.camera;
+  const auto& k = camera.intrinsics();
+  const Eigen::Matrix3d R = simulation.body_from_camera.rotation.toRotationMatrix();
+  const Eigen::Vector3d& p = simulation.body_from_camera.translation;
+  std::string text =
+      "# Simulated camera. Integer pixel coordinates are pixel centres.\nsensor_type: camera\n"
+      "# T_BS takes camera coordinates (x right, y down, z forward) to the body (FRD).\n"
+      "T_BS:\n  cols: 4\n  rows: 4\n  data: [";
+  for (int i = 0; i < 3; ++i) text += numbers({R(i, 0), R(i, 1), R(i, 2), p[i]}) + ",\n         ";
+  text += "0, 0, 0, 1]\n" + format("rate_hz: %.17g\n", simulation.rate_hz);
+  text += format("resolution: [%d, %d]\ncamera_model: pinhole\n", camera.width(), camera.height());
+  if (k.size() >= 4) text += "intrinsics: [" + numbers({k[0], k[1], k[2], k[3]}) + "]\n";
+  if (camera.lens() == "LENSMODEL_PINHOLE") {
+    text += "distortion_model: radial-tangential\ndistortion_coefficients: [0, 0, 0, 0]\n";
+  } else if (camera.lens() == "LENSMODEL_OPENCV4") {
+    text += "distortion_model: radial-tangential\ndistortion_coefficients: [" +
+            numbers({k.begin() + 4, k.end()}) + "]\n";
+  } else {
+    text += "# The lens is none that this file can describe: see camera.cameramodel.\n";
+  }
+  return text;
+}
+
+std::string camera_model(const CameraModel& camera) {
+  return "{\n    'lensmodel':  '" + camera.lens() + "',\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n" +
+         "    'intrinsics': [ " + numbers(camera.intrinsics()) + " ],\n" +
+         format("    'imagersize': [ %d, %d ]\n}\n", camera.width(), camera.height());
+}
+
+std::string pose_yaml(const Rigid3& pose) {
+  const Eigen::Vector3d& p = pose.translation;
+  const Eigen::Quaterniond q = positive_w(pose.rotation);
+  return "{position: [" + numbers({p.x(), p.y(), p.z()}) + "], rotation: {quaternion_wxyz: [" +
+         numbers({q.w(), q.x(), q.y(), q.z()}) + "]}}";
+}
+
+// What perch-batch needs to score this flight: everything as it really was.
+std::string perch_yaml(const Simulation& simulation) {
+  return "# For perch-batch --config perch.yaml: the frames as they were simulated.\ntarget: "
+         "target.yaml\nframes:\n"
+         "  base_from_camera: identity\n  body_from_base: " +
+         pose_yaml(simulation.body_from_camera) +
+         "\n  target_from_pad: identity\n  world_from_pad: " + pose_yaml(simulation.world_from_pad) +
+         format("\n  time_offset: %.17g\n", simulation.nav.time_offset);
+}
+
+std::string frame_name(const SimulatedFlight& flight, int64_t frame) {
+  return format("%" PRId64 ".png", flight.timestamp_ns(frame));
+}
+
+}  // namespace
+
+FlightFolder::FlightFolder(const fs::path& folder, bool force)
+    // Without a slash at its end, which would put ".part" into the folder.
+    : folder_(fs::absolute(folder / "").parent_path()), part_(folder_.string() + ".part") {
+  if (fs::exists(folder_) && !(fs::is_directory(folder_) && fs::is_empty(folder_))) {
+    if (!is_ours(folder_))
+      throw std::runtime_error(folder_.string() + ": holds something else; not overwritten");
+    if (!force) throw std::runtime_error(folder_.string() + ": holds a flight already; --force replaces it");
+  }
+  if (fs::exists(part_) && !is_ours(part_)) {
+    throw std::runtime_error(part_.string() + ": is in the way and not ours");
+  }
+  fs::remove_all(part_);
+  fs::create_directories(part_ / "mav0" / "cam0" / "data");
+  fs::create_directories(part_ / "mav0" / "nav0");
+  fs::create_directories(part_ / "mav0" / "state_groundtruth_estimate0");
+  write(part_ / "simulation.yaml", std::string(kMark) + "\n");
+}
+
+FlightFolder::~FlightFolder() {
+  std::error_code ignored;
+  if (!part_.empty()) fs::remove_all(part_, ignored);
+}
+
+void FlightFolder::write_frame(const SimulatedFlight& flight, int64_t frame) const {
+  const fs::path file = part_ / "mav0" / "cam0" / "data" / frame_name(flight, frame);
+  // Noise does not compress: the fastest level costs 3 % of space.
+  if (!cv::imwrite(file.string(), flight.picture(frame), {cv::IMWRITE_PNG_COMPRESSION, 1})) {
+    throw std::runtime_error(file.string() + ": cannot be written");
+  }
+}
+
+void FlightFolder::write_tables(const SimulatedFlight& flight,
+                                const std::string& resolved_configuration) const {
+  const Simulation& simulation = flight.simulation();
+  const fs::path mav = part_ / "mav0";
+  std::string frames = "#timestamp [ns],filename\n";
+  std::string poses = "#timestamp [ns],t_x [m],t_y [m],t_z [m],q_w [],q_x [],q_y [],q_z []\n";
+  std::string states =
+      "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], "
+      "v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad "
+      "s^-1], "
+      "b_w_RS_S_z [rad s^-1], b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n";
+  for (int64_t i = 0; i < flight.frames(); ++i) {
+    const std::string time = format("%" PRId64 ",", flight.timestamp_ns(i));
+    const VehicleTruth truth = flight.vehicle(i);
+    frames += time + frame_name(flight, i) + "\n";
+    poses += time + point_and_quaternion(flight.camera_from_target(i)) + "\n";
+    states += time + point_and_quaternion(truth.world_from_body) + "," +
+              velocity(truth.body_velocity_in_world) + ",0,0,0,0,0,0\n";
+  }
+  std::string nav = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z,v_x [m/s],v_y [m/s],v_z [m/s]\n";
+  for (const auto& report : flight.navigation()) {
+    nav += format("%" PRId64 ",", report.timestamp_ns) + point_and_quaternion(report.world_from_body) + "," +
+           velocity(report.body_velocity_in_world) + "\n";
+  }
+  write(mav / "cam0" / "data.csv", frames);
+  write(mav / "cam0" / "truth_target_pose.csv", poses);
+  write(mav / "state_groundtruth_estimate0" / "data.csv", states);
+  write(mav / "nav0" / "data.csv", nav);
+  write(mav / "cam0" / "sensor.yaml", sensor_yaml(simulation));
+  if (simulation.camera.lens() != "LENSMODEL_PINHOLE" && simulation.camera.lens() != "LENSMODEL_OPENCV4") {
+    write(mav / "cam0" / "camera.cameramodel", camera_model(simulation.camera));
+  }
+  fs::copy_file(simulation.target_file, part_ / "target.yaml", fs::copy_options::overwrite_existing);
+  write(part_ / "perch.yaml", perch_yaml(simulation));
+  write(part_ / "simulation.yaml", std::string(kMark) + "\n" + resolved_configuration);
+}
+
+void FlightFolder::finish() {
+  fs::remove_all(folder_);  // an empty folder, or a flight of ours that --force gave up
+  fs::rename(part_, folder_);
+  part_.clear();
+}
+
+}  // namespace perch

@@ -1,0 +1,70 @@
+#include "perch/simulation/simulation.h"
+
+#include <cmath>
+
+#include "perch/geometry/euler.h"
+
+namespace perch {
+
+namespace {
+
+constexpr int64_t kStartNs = 1700000000000000000;  // a date like any other
+// Numbers of the independent random streams of one seed.
+constexpr uint64_t kDescentStream = 1, kNavigationStream = 2, kPictureStream = 3;
+
+uint64_t stream_seed(uint64_t seed, uint64_t stream) { return RandomStream(seed, stream).bits(); }
+
+// A flight's start is the middle of nothing: 30 Hz frames get whole nanoseconds, rounded, not added up.
+int64_t frame_ns(int64_t frame, double rate_hz) {
+  return std::llround(static_cast<double>(frame) / rate_hz * 1e9);
+}
+
+}  // namespace
+
+Simulation::Simulation()
+    // The camera's x is the body's y (right), its y backwards, its z down; then 10 degrees of pitch.
+    : body_from_camera{rotation_from_ypr({0, 10 * kRadFromDeg, 0}) * rotation_from_ypr({M_PI / 2, 0, 0}),
+                       {0.1, 0, 0.05}},
+      world_from_pad{rotation_from_ypr({25 * kRadFromDeg, 0, M_PI}), {12, -7, -0.4}} {}
+
+SimulatedFlight::SimulatedFlight(const Simulation& simulation)
+    : simulation_(simulation),
+      descent_(simulation.flight, simulation.world_from_pad.translation,
+               stream_seed(simulation.seed, kDescentStream)),
+      renderer_(simulation.camera, simulation.target, simulation.picture.scene, simulation.picture.optics),
+      sensor_(simulation.picture.sensor) {}
+
+int64_t SimulatedFlight::frames() const {
+  return static_cast<int64_t>(std::floor(descent_.duration() * simulation_.rate_hz)) + 1;
+}
+
+int64_t SimulatedFlight::timestamp_ns(int64_t frame) const {
+  return kStartNs + frame_ns(frame, simulation_.rate_hz);
+}
+
+double SimulatedFlight::time(int64_t frame) const {
+  return static_cast<double>(frame_ns(frame, simulation_.rate_hz)) * 1e-9;
+}
+
+VehicleTruth SimulatedFlight::vehicle(int64_t frame) const { return descent_.at(time(frame)); }
+
+Rigid3 SimulatedFlight::camera_from_target_at(double time) const {
+  const Rigid3 world_from_camera = descent_.at(time).world_from_body * simulation_.body_from_camera;
+  return inverse(world_from_camera) * simulation_.world_from_pad;
+}
+
+Rigid3 SimulatedFlight::camera_from_target(int64_t frame) const { return camera_from_target_at(time(frame)); }
+
+cv::Mat_<uint8_t> SimulatedFlight::picture(int64_t frame) const {
+  const double middle = time(frame);
+  const PoseAt pose = [&](double t) { return camera_from_target_at(middle + t); };
+  const auto radiance = renderer_.radiance(pose, simulation_.shutter, middle);
+  return sensor_.picture(radiance, stream_seed(simulation_.seed, kPictureStream),
+                         static_cast<uint64_t>(frame));
+}
+
+std::vector<NavigationReport> SimulatedFlight::navigation() const {
+  return navigate(descent_, simulation_.nav, kStartNs, stream_seed(simulation_.seed, kNavigationStream));
+}
+
+}  // namespace perch

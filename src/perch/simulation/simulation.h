@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "perch/camera/camera_model.h"
+#include "perch/config/section.h"
+#include "perch/simulation/descent.h"
+#include "perch/simulation/navigation.h"
+#include "perch/simulation/picture.h"
+#include "perch/target/landing_target.h"
+
+namespace perch {
+
+// All of a simulated landing: what configs/simulation/*.yaml say. The pad is the target (target_from_pad
+// identity).
+struct Simulation {
+  std::filesystem::path target_file;
+  LandingTarget target;
+  CameraModel camera = CameraModel::pinhole(450, 450, 319.5, 239.5, 640, 480);
+  double rate_hz = 30;
+  // Under the nose, looking down and 10 degrees forward; up in the picture is forward.
+  Rigid3 body_from_camera;
+  // Level, face up: the pad's z is -z of NED.
+  Rigid3 world_from_pad;
+  ShutterOptions shutter;
+  PictureOptions picture;
+  DescentOptions flight;
+  NavigationOptions nav;
+  uint64_t seed = 1;
+
+  Simulation();
+};
+
+// Reads `target`, `camera`, `flight`, `scene`, `sensor`, `nav` and `seed`, refuses unknown keys. Every key
+// has a default but `target`. Throws ConfigError.
+Simulation read_simulation(Section root);
+
+// A simulation in flight. Const calls may run in several threads: frames depend on nothing but their number.
+class SimulatedFlight {
+ public:
+  explicit SimulatedFlight(const Simulation& simulation);
+
+  int64_t frames() const;
+  int64_t timestamp_ns(int64_t frame) const;  // mid-exposure, camera clock
+  VehicleTruth vehicle(int64_t frame) const;  // then
+  Rigid3 camera_from_target(int64_t frame) const;
+  cv::Mat_<uint8_t> picture(int64_t frame) const;
+  std::vector<NavigationReport> navigation() const;
+  const Simulation& simulation() const { return simulation_; }
+
+ private:
+  double time(int64_t frame) const;  // since the start, s
+  Rigid3 camera_from_target_at(double time) const;
+
+  Simulation simulation_;
+  Descent descent_;
+  Renderer renderer_;
+  Sensor sensor_;
+};
+
+}  // namespace perch
