@@ -2,7 +2,9 @@
 
 #include <stdexcept>
 
-#include "perch/detection/apriltag_family.h"
+#include "perch/detection/make_detector.h"
+#include "perch/simulation/picture.h"
+#include "perch/target/tag_family.h"
 #include "support/printed_tags.h"
 #include "support/rng.h"
 
@@ -35,7 +37,7 @@ void photograph(cv::Mat& picture, TestRng& rng) {
 }
 
 void paint_board(cv::Mat& picture, const AprilTagBoard& board, const Eigen::Matrix3d& pixel_from_target) {
-  const AprilTagFamily family = make_apriltag_family(board.family, 1);
+  const TagFamily family = make_tag_family(board.family, 1);
   const int width = family->width_at_border + 2 * (board.border - 1);
   for (const Tag& tag : board.tags) {
     paint_tag(picture, printed_tag(family.get(), tag.id, board.border), width, tag, pixel_from_target);
@@ -195,7 +197,7 @@ TEST(AprilTagDetector, ATagWithAnotherBorderIsNotTaken) {
 
 TEST(AprilTagDetector, WrongBitsCountOnlyAsFarAsAllowed) {
   const AprilTagBoard board{"tag36h11", 1, {{7, 0.8, {0, 0}, 0}}};
-  const AprilTagFamily family = make_apriltag_family(board.family, 1);
+  const TagFamily family = make_tag_family(board.family, 1);
   cv::Mat printed = printed_tag(family.get(), 7, 1);
   printed.at<uchar>(4, 4) = static_cast<uchar>(255 - printed.at<uchar>(4, 4));
   cv::Mat picture = empty_ground();
@@ -208,7 +210,7 @@ TEST(AprilTagDetector, WrongBitsCountOnlyAsFarAsAllowed) {
 
 TEST(AprilTagDetector, ATagInTheNoiseIsNotTrusted) {
   const AprilTagBoard board{"tag36h11", 1, {{7, 0.8, {0, 0}, 0}}};
-  const AprilTagFamily family = make_apriltag_family(board.family, 1);
+  const TagFamily family = make_tag_family(board.family, 1);
   cv::Mat picture = empty_ground();
   paint_tag(picture, printed_tag(family.get(), 7, 1), family->width_at_border, board.tags[0],
             pixel_from_target(3, 0, 0, 0), 100, 108);  // 4 levels from the middle, 8 sharpened
@@ -292,6 +294,31 @@ TEST(AprilTagDetector, RefusesBoardsThatCannotBe) {
   AprilTagOptions options;
   options.quad_decimate = 1.7;
   EXPECT_THROW(AprilTagDetector({"tag36h11", 1, tags}, options), std::invalid_argument);
+}
+
+// The whole way: target file, features, renderer, detector, which must agree about every corner.
+TEST(AprilTagDetector, FindsTheFeaturesOfARenderedTargetFile) {
+  for (const std::string border : {"1", "2"}) {
+    const LandingTarget target =
+        read_target(Section::parse("{type: apriltag, family: tag36h11, border: " + border +
+                                       ", tags: [{id: 3, size: 0.6, center: [-0.3, 0.1], yaw: 0.4}, {id: 11, "
+                                       "size: 0.3, center: [0.4, -0.1]}]}",
+                                   "board.yaml"));
+    const auto detector = make_detector(target, {});
+    const CameraModel camera = CameraModel::pinhole(600, 610, 330, 230, 640, 480);
+    const Rigid3 camera_from_target{Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.6, -0.8, 0)) *
+                                        Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()) *
+                                        Eigen::AngleAxisd(1, Eigen::Vector3d::UnitZ()),
+                                    Eigen::Vector3d(0.1, -0.1, 2.5)};
+    const Detection& found = detector->detect(render(target, camera, camera_from_target), {});
+    ASSERT_EQ(found.correspondences.size(), target.features.size()) << "border " << border;
+    for (const Correspondence& c : found.correspondences) {
+      const Feature& feature = target.features[static_cast<size_t>(c.feature)];
+      const Eigen::Vector3d p_target(feature.point.x(), feature.point.y(), 0);
+      const auto expected = camera.pixel_from_camera(camera_from_target * p_target);
+      EXPECT_LE((c.pixel - *expected).norm(), kMaxErrorPx) << feature.name << ", border " << border;
+    }
+  }
 }
 
 AprilTagOptions options_from(const std::string& text) {

@@ -9,7 +9,7 @@
 #include "perch/detection/apriltag_detector.h"
 #include "perch/geometry/homography.h"
 #include "support/aprilgrid.h"
-#include "support/shared_data.h"
+#include "support/shared.h"
 
 namespace perch {
 namespace {
@@ -42,14 +42,16 @@ std::vector<double> distances_from_grid(const Detection& found, const AprilTagBo
 //   decimate 2: 20 24 30 18 31 34 28 33 23 24 24 35 34 24 30 of 36 tags, 412 of 540 in all
 //   decimate 1: 27 28 30 27 33 31 32 30 22 25 24 34 34 31 30,            438
 TEST(AprilTagRecorded, TheGridIsSeenInEveryPictureAndLiesInItsPlane) {
-  const auto folder = shared_data("flights/real_mocap/mav0/cam0/data");
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no " << folder;
+  const auto flight = shared_flight("real_mocap");
+  if (flight.empty()) GTEST_SKIP() << "no real_mocap";
+  const auto folder = flight / "mav0/cam0";
   const AprilTagBoard board = real_mocap_board();
-  const CameraModel camera = real_mocap_camera();
+  const CameraModel camera = read_camera_model(folder / "sensor.yaml");
   AprilTagDetector detector(board);
 
   std::set<std::filesystem::path> pictures;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) pictures.insert(entry.path());
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "data"))
+    pictures.insert(entry.path());
   EXPECT_EQ(pictures.size(), 15u);
   std::vector<double> all;
   std::set<int> tags;

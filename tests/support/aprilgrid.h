@@ -1,6 +1,5 @@
 #pragma once
 
-#include "perch/camera/camera_model.h"
 #include "perch/target/landing_target.h"
 
 namespace perch {
@@ -21,13 +20,6 @@ inline AprilTagBoard real_mocap_board() {
     board.tags.push_back({id, kTag, lower_left + Eigen::Vector2d(kTag / 2, kTag / 2), 0});
   }
   return board;
-}
-
-// Its camera, as its sensor.yaml has it.
-inline CameraModel real_mocap_camera() {
-  return CameraModel("LENSMODEL_OPENCV4",
-                     {608.2994, 610.9263, 325.3610, 242.6235, 0.1038326, -0.1973338, -0.0036143, 0.0000723},
-                     640, 480);
 }
 
 }  // namespace perch

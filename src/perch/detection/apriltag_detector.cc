@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "perch/detection/apriltag_family.h"
 #include "perch/detection/stopwatch.h"
+#include "perch/target/tag_family.h"
 
 namespace perch {
 namespace {
@@ -32,6 +32,18 @@ void check(const AprilTagOptions& options) {
   if (options.threads < 1 || options.threads > 64) refuse("threads must be within 1 and 64");
   if (options.max_hamming < 0 || options.max_hamming > 2) refuse("max_hamming must be within 0 and 2");
   if (!(options.min_decision_margin >= 0)) refuse("min_decision_margin must not be negative");
+}
+
+// read_target checks all of this too, with file and line; boards also come from elsewhere.
+TagFamily make_family(const AprilTagBoard& board) {
+  const std::string border = board.family + ": a border of " + std::to_string(board.border) + " modules";
+  if (board.border < 1) throw std::invalid_argument(border);
+  TagFamily family = make_tag_family(board.family, board.border);
+  if (!family) throw std::invalid_argument(board.family + ": no family of libapriltag");
+  if (board.border > 1 && !has_black_border(*family)) {
+    throw std::invalid_argument(border + ", which has data on both sides of it");
+  }
+  return family;
 }
 
 // The index of each id's tag on the board, -1 where the board has no such id.
@@ -80,7 +92,7 @@ Eigen::Vector2d corner_pixel(const apriltag_detection_t& tag, int k) {
 struct AprilTagDetector::Library {
   Library(const AprilTagBoard& board, const AprilTagOptions& opts)
       : options((check(opts), opts)),
-        family(make_apriltag_family(board.family, board.border)),
+        family(make_family(board)),
         detector(make_detector(options, family.get())),
         tag_of_id(tags_by_id(board, *family)),
         sightings(board.tags.size()) {}
@@ -95,7 +107,7 @@ struct AprilTagDetector::Library {
   };
 
   AprilTagOptions options;
-  AprilTagFamily family;  // outlives the detector, which gives back its decoding table
+  TagFamily family;  // outlives the detector, which gives back its decoding table
   DetectorHandle detector;
   std::vector<int> tag_of_id;
   std::vector<Sighting> sightings;  // of each tag of the board, in this picture

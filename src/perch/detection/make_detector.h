@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "perch/config/section.h"
+#include "perch/detection/apriltag_detector.h"
 #include "perch/detection/detector.h"
 #include "perch/detection/squares_detector.h"
 #include "perch/target/landing_target.h"
@@ -11,6 +12,7 @@ namespace perch {
 
 struct DetectionOptions {
   PaperOptions paper;
+  AprilTagOptions apriltag;  // of a target that is an AprilTag board
 };
 
 // Reads the `detection` section and refuses unknown keys.
