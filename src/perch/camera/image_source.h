@@ -16,6 +16,7 @@ struct Frame {
   int64_t timestamp_ns = 0;  // mid-exposure, on the camera's clock
   cv::Mat grey;              // CV_8UC1, continuous; empty when `problem` says why
   std::string name;          // file, or file#number of a video
+  std::filesystem::path file;  // between ImageSource::advance and ::read: what is to be read
   std::string problem;       // "…/17.png: truncated", empty when all is well
 };
 
@@ -23,8 +24,16 @@ struct Frame {
 class ImageSource {
  public:
   virtual ~ImageSource() = default;
-  // False after the last one.
-  virtual bool next(Frame& frame) = 0;
+  // The next picture; false after the last one.
+  bool next(Frame& frame) {
+    if (!advance(frame)) return false;
+    read(frame);
+    return true;
+  }
+  // The same in two steps, for those who decode in parallel: `advance` says which picture is next, `read` fills its
+  // pixels in. `advance` belongs to one thread; `read` may run in any, several at once.
+  virtual bool advance(Frame& frame) = 0;
+  virtual void read(Frame& frame) const = 0;
   // How many there are; -1 when that cannot be known.
   virtual int64_t size() const = 0;
   // What was wrong with the source as a whole and was skipped: rows of data.csv, a clock that went back.

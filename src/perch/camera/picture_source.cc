@@ -31,19 +31,19 @@ class PictureSource : public ImageSource {
     problems_ = std::move(problems);
   }
 
-  bool next(Frame& frame) override {
+  bool advance(Frame& frame) override {
     if (next_ == pictures_.size()) return false;
     const Picture& picture = pictures_[next_++];
+    frame = Frame{};
     frame.timestamp_ns = picture.timestamp_ns;
     frame.name = picture.file.filename().string();
-    read(picture, frame);
+    frame.file = picture.file;
     return true;
   }
+  void read(Frame& frame) const override { read_picture(frame.file, channel_, frame); }
   int64_t size() const override { return static_cast<int64_t>(pictures_.size()); }
 
  protected:
-  virtual void read(const Picture& picture, Frame& frame) { read_picture(picture.file, channel_, frame); }
-
   std::vector<Picture> pictures_;
   size_t next_ = 0;
   Channel channel_;
@@ -55,18 +55,21 @@ class FlightVideoSource : public PictureSource {
                     Channel channel)
       : PictureSource(std::move(pictures), std::move(problems), channel), file_(video), video_(video) {}
 
- private:
-  void read(const Picture& picture, Frame& frame) override {
-    frame.name = file_.filename().string() + "#" + std::to_string(picture.row);
-    frame.grey.release();
-    frame.problem.clear();
-    if (video_.seek(picture.row)) {
+  // A video's frames can be decoded in their order only.
+  bool advance(Frame& frame) override {
+    if (!PictureSource::advance(frame)) return false;
+    const int64_t row = pictures_[next_ - 1].row;
+    frame.name = file_.filename().string() + "#" + std::to_string(row);
+    if (video_.seek(row)) {
       video_.read(channel_, frame);
     } else {
-      frame.problem = file_.string() + ": ends before frame " + std::to_string(picture.row);
+      frame.problem = file_.string() + ": ends before frame " + std::to_string(row);
     }
+    return true;
   }
+  void read(Frame&) const override {}
 
+ private:
   fs::path file_;
   VideoReader video_;
 };

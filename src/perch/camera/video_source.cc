@@ -62,7 +62,9 @@ class VideoSource : public ImageSource {
     if (rate > 0.1 && rate < 1e5) period_ns_ = static_cast<int64_t>(1e9 / rate);
   }
 
-  bool next(Frame& frame) override {
+  void read(Frame&) const override {}  // decoded in `advance`: in their order only
+  bool advance(Frame& frame) override {
+    frame = Frame{};
     if (!video_.seek(number_)) {
       if (number_ < size() && problems_.empty()) {
         problems_.push_back(name_ + ": ends after " + std::to_string(number_) + " of " +

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "perch/flight/atomic_file.h"
+#include "perch/config/atomic_file.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/estimates_names.h"
 

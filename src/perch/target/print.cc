@@ -11,7 +11,7 @@
 
 #include "perch/target/draw.h"
 #include "perch/target/png_resolution.h"
-#include "perch/target/whole_file.h"
+#include "perch/config/atomic_file.h"
 
 namespace perch {
 namespace {
@@ -85,8 +85,8 @@ class Canvas {
 };
 
 cairo_status_t write_to_file(void* file, const unsigned char* data, unsigned int length) {
-  static_cast<WholeFile*>(file)->write({reinterpret_cast<const char*>(data), length});
-  return CAIRO_STATUS_SUCCESS;  // WholeFile tells when it is kept
+  static_cast<AtomicFile*>(file)->stream().write(reinterpret_cast<const char*>(data), length);
+  return CAIRO_STATUS_SUCCESS;  // AtomicFile tells when it is committed
 }
 
 cairo_status_t append_to_string(void* text, const unsigned char* data, unsigned int length) {
@@ -104,7 +104,7 @@ void write_pdf(const std::vector<Page>& pages, const std::string& title, const f
                                " mm: take tiles (--paper) or .svg");
     }
   }
-  WholeFile file(output);
+  AtomicFile file(output);
   const auto points = [](const Size& size) {
     return Size{size.width * kPointsPerMm, size.height * kPointsPerMm};
   };
@@ -118,16 +118,16 @@ void write_pdf(const std::vector<Page>& pages, const std::string& title, const f
     cairo_show_page(canvas.context());
   }
   canvas.finish();
-  file.keep();
+  file.commit();
 }
 
 void write_svg(const Page& page, const fs::path& output) {
-  WholeFile file(output);
+  AtomicFile file(output);
   Canvas canvas(cairo_svg_surface_create_for_stream(write_to_file, &file, page.size.width, page.size.height));
   cairo_svg_surface_set_document_unit(canvas.surface(), CAIRO_SVG_UNIT_MM);
   canvas.draw(page, 1);
   canvas.finish();
-  file.keep();
+  file.commit();
 }
 
 void write_png(const Page& page, double dpi, const fs::path& output) {
@@ -142,7 +142,7 @@ void write_png(const Page& page, double dpi, const fs::path& output) {
                              std::to_string(std::lround(width)) + " x " +
                              std::to_string(std::lround(height)) + ": take a smaller --dpi, --paper or .pdf");
   }
-  WholeFile file(output);
+  AtomicFile file(output);
   Canvas canvas(
       cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(width), static_cast<int>(height)));
   cairo_set_source_rgb(canvas.context(), 1, 1, 1);
@@ -151,8 +151,8 @@ void write_png(const Page& page, double dpi, const fs::path& output) {
   Canvas::check(cairo_status(canvas.context()));
   std::string png;
   Canvas::check(cairo_surface_write_to_png_stream(canvas.surface(), append_to_string, &png));
-  file.write(with_resolution(png, dpi));
-  file.keep();
+  file.append(with_resolution(png, dpi));
+  file.commit();
 }
 
 // pad.svg, pad-overview.svg, pad-r1c1.svg, ...

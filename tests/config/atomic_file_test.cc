@@ -1,4 +1,4 @@
-#include "perch/flight/atomic_file.h"
+#include "perch/config/atomic_file.h"
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>

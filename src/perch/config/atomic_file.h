@@ -35,4 +35,7 @@ class AtomicFile {
   std::ofstream stream_;
 };
 
+// A file with just this text.
+void write_whole_file(const std::filesystem::path& file, std::string_view text);
+
 }  // namespace perch

@@ -1,4 +1,4 @@
-#include "perch/flight/atomic_file.h"
+#include "perch/config/atomic_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -48,6 +48,12 @@ void AtomicFile::commit() {
 void AtomicFile::fail() const {
   throw std::runtime_error(file_.string() + ": cannot be written: " +
                            (errno ? std::generic_category().message(errno) : "an earlier error"));
+}
+
+void write_whole_file(const std::filesystem::path& file, std::string_view text) {
+  AtomicFile out(file);
+  out.append(text);
+  out.commit();
 }
 
 }  // namespace perch
