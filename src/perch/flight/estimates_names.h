@@ -12,7 +12,7 @@ namespace perch {
 
 // The names in estimates.csv and states.csv, for the writer and the reader.
 
-inline constexpr std::pair<EstimateStatus, std::string_view> kStatuses[] = {
+inline constexpr std::pair<EstimateStatus, std::string_view> kStatusNames[] = {
     {EstimateStatus::kOk, "ok"},
     {EstimateStatus::kNoTarget, "no_target"},
     {EstimateStatus::kPartial, "partial"},
@@ -20,7 +20,7 @@ inline constexpr std::pair<EstimateStatus, std::string_view> kStatuses[] = {
     {EstimateStatus::kRejected, "rejected"},
     {EstimateStatus::kUnreadable, "unreadable"},
 };
-inline constexpr std::pair<StateSource, std::string_view> kSources[] = {
+inline constexpr std::pair<StateSource, std::string_view> kSourceNames[] = {
     {StateSource::kVision, "vision"}, {StateSource::kPredicted, "predicted"}, {StateSource::kLost, "lost"}};
 
 template <typename Enum, size_t n>

@@ -73,7 +73,7 @@ std::vector<Result> read_table(const std::filesystem::path& file, const std::vec
 Estimate read_estimate(Row& row) {
   Estimate estimate;
   estimate.timestamp_ns = row.integer();
-  estimate.status = row.choice(kStatuses);
+  estimate.status = row.choice(kStatusNames);
   if (estimate.status == EstimateStatus::kOk) {
     estimate.camera_from_target.mean = row.pose();
     PoseCovariance& covariance = estimate.camera_from_target.covariance;
@@ -102,7 +102,7 @@ VehicleState read_state(Row& row) {
     const double sigma = row.number();
     state.covariance(i, i) = sigma * sigma;
   }
-  state.source = row.choice(kSources);
+  state.source = row.choice(kSourceNames);
   return state;
 }
 

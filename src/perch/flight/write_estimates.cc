@@ -54,7 +54,7 @@ std::string states_header() { return joined(state_columns()); }
 void append_estimate(const Estimate& estimate, std::string& csv) {
   append_number(csv, estimate.timestamp_ns);
   csv += ',';
-  csv += name_of(kStatuses, estimate.status);
+  csv += name_of(kStatusNames, estimate.status);
   const bool has_pose = estimate.status == EstimateStatus::kOk;
   if (has_pose) {
     append_pose(csv, estimate.camera_from_target.mean);
@@ -85,7 +85,7 @@ void append_state(const VehicleState& state, std::string& csv) {
   for (const double value : state.body_angular_velocity_in_pad) append_field(csv, value);
   for (int i = 0; i < 12; ++i) append_field(csv, std::sqrt(state.covariance(i, i)));
   csv += ',';
-  csv += name_of(kSources, state.source);
+  csv += name_of(kSourceNames, state.source);
   csv += '\n';
 }
 
