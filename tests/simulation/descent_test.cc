@@ -52,6 +52,7 @@ TEST(Descent, TiltsAsItsAccelerationAsks) {
 
 TEST(Descent, GoesFromItsStartToOverThePadAndStays) {
   DescentOptions options;
+  options.touchdown_aside = 0;
   options.gust_position = 0;
   const Descent descent(options, kPad, 3);
   const Eigen::Vector3d start = descent.at(0).world_from_body.translation - kPad;

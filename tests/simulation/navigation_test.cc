@@ -26,7 +26,9 @@ TEST(Navigation, WithoutNoiseIsTheTruthOnItsOwnClock) {
     EXPECT_LE((reports[i].world_from_body.translation - truth.world_from_body.translation).norm(), 1e-12);
     EXPECT_LE(reports[i].world_from_body.rotation.angularDistance(truth.world_from_body.rotation), 1e-12);
     EXPECT_LE((reports[i].body_velocity_in_world - truth.body_velocity_in_world).norm(), 1e-12);
-    if (i > 0) EXPECT_EQ(reports[i].timestamp_ns - reports[i - 1].timestamp_ns, 20000000);
+    if (i > 0) {
+      EXPECT_EQ(reports[i].timestamp_ns - reports[i - 1].timestamp_ns, 20000000);
+    }
   }
   // The first and the last picture lie between two reports.
   EXPECT_LT(reports.front().timestamp_ns + 123000000, kStart);

@@ -25,13 +25,18 @@ Way way_left(double s) {
           -kEntry + s * s * (3 * a + s * (4 * b + s * 5 * c)), s * (6 * a + s * (12 * b + s * 20 * c))};
 }
 
+// A place seen from the pad, NED.
+Eigen::Vector3d beside(double bearing, double aside, double height) {
+  return {aside * std::cos(bearing), aside * std::sin(bearing), -height};
+}
+
 // The axes of a body whose thrust gives this acceleration, with the nose towards a heading.
 Eigen::Quaterniond attitude(const Eigen::Vector3d& acceleration, double heading) {
   const Eigen::Vector3d z = (Eigen::Vector3d(0, 0, kGravity) - acceleration).normalized();
-  const Eigen::Vector3d nose(std::cos(heading), std::sin(heading), 0);
-  const Eigen::Vector3d y = z.cross(nose).normalized();
+  const Eigen::Vector3d right(-std::sin(heading), std::cos(heading), 0);
+  const Eigen::Vector3d x = right.cross(z).normalized();  // leaning, but above the line of the heading
   Eigen::Matrix3d world_from_body;
-  world_from_body << y.cross(z), y, z;
+  world_from_body << x, z.cross(x), z;
   return Eigen::Quaterniond(world_from_body);
 }
 
@@ -39,10 +44,8 @@ Eigen::Quaterniond attitude(const Eigen::Vector3d& acceleration, double heading)
 
 Descent::Descent(const DescentOptions& options, const Eigen::Vector3d& pad_in_world, uint64_t seed)
     : options_(options),
-      start_(pad_in_world + Eigen::Vector3d(options.start_aside * std::cos(options.start_bearing),
-                                            options.start_aside * std::sin(options.start_bearing),
-                                            -options.start_height)),
-      end_(pad_in_world - Eigen::Vector3d(0, 0, options.touchdown_height)),
+      start_(pad_in_world + beside(options.start_bearing, options.start_aside, options.start_height)),
+      end_(pad_in_world + beside(options.start_bearing, options.touchdown_aside, options.touchdown_height)),
       random_(seed),
       position_gust_(options.gust_position, options.gust_correlation, random_),
       attitude_gust_(options.gust_attitude, options.gust_correlation, random_) {}

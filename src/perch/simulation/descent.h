@@ -18,16 +18,18 @@ struct DescentOptions {
   double start_height = 8;     // of the body over the pad, m
   double start_aside = 2;      // horizontally from the pad, m
   double start_bearing = 0.6;  // of the start seen from the pad, rad from north to east; the nose points back
-  double touchdown_height = 1;    // where the descent ends, m
-  double duration = 12;           // of the descent, s
-  double hover = 1;               // held there afterwards, s
+  double touchdown_height = 1;  // where the descent ends, m
+  double touchdown_aside =
+      0.2;               // still short of the pad: a camera that looks forward then has it in its middle, m
+  double duration = 12;  // of the descent, s
+  double hover = 1;      // held there afterwards, s
   double yaw_drift = 0.02;        // rad/s
   double gust_position = 0.06;    // one deviation of each axis, m
   double gust_attitude = 0.015;   // rad
   double gust_correlation = 1.5;  // s
 };
 
-// A landing: from beside and above straight to the pad, slower and slower, then held over it, pushed about by
+// A landing: from beside and above straight to the pad, slower and slower, then held there, pushed about by
 // gusts. Position is a quintic in time (from -1.3 times its mean speed to rest) plus a gust; the attitude is
 // what a multirotor needs for that acceleration, its thrust along -z of the body,
 //

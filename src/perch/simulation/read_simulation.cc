@@ -56,6 +56,7 @@ void read_flight_options(Section flight, Simulation& simulation) {
   flight.read("start_aside", o.start_aside, kNotNegative);
   read_deg(flight, "start_bearing_deg", o.start_bearing);
   flight.read("touchdown_height", o.touchdown_height, kPositive);
+  flight.read("touchdown_aside", o.touchdown_aside, kNotNegative);
   flight.read("duration", o.duration, Range{0.1, 3600});
   flight.read("hover", o.hover, Range{0, 3600});
   read_deg(flight, "yaw_drift_deg_per_s", o.yaw_drift);

@@ -14,7 +14,7 @@ constexpr uint64_t kDescentStream = 1, kNavigationStream = 2, kPictureStream = 3
 
 uint64_t stream_seed(uint64_t seed, uint64_t stream) { return RandomStream(seed, stream).bits(); }
 
-// A flight's start is the middle of nothing: 30 Hz frames get whole nanoseconds, rounded, not added up.
+// Rounded from the start, not added up: 30 Hz has no whole number of nanoseconds.
 int64_t frame_ns(int64_t frame, double rate_hz) {
   return std::llround(static_cast<double>(frame) / rate_hz * 1e9);
 }
@@ -22,8 +22,8 @@ int64_t frame_ns(int64_t frame, double rate_hz) {
 }  // namespace
 
 Simulation::Simulation()
-    // The camera's x is the body's y (right), its y backwards, its z down; then 10 degrees of pitch.
-    : body_from_camera{rotation_from_ypr({0, 10 * kRadFromDeg, 0}) * rotation_from_ypr({M_PI / 2, 0, 0}),
+    // The camera's x is the body's y (right), its y backwards, its z down; then 8 degrees of pitch.
+    : body_from_camera{rotation_from_ypr({0, 8 * kRadFromDeg, 0}) * rotation_from_ypr({M_PI / 2, 0, 0}),
                        {0.1, 0, 0.05}},
       world_from_pad{rotation_from_ypr({25 * kRadFromDeg, 0, M_PI}), {12, -7, -0.4}} {}
 

@@ -19,7 +19,7 @@ struct Simulation {
   LandingTarget target;
   CameraModel camera = CameraModel::pinhole(450, 450, 319.5, 239.5, 640, 480);
   double rate_hz = 30;
-  // Under the nose, looking down and 10 degrees forward; up in the picture is forward.
+  // Under the nose, looking down and 8 degrees forward; up in the picture is forward.
   Rigid3 body_from_camera;
   // Level, face up: the pad's z is -z of NED.
   Rigid3 world_from_pad;
