@@ -97,6 +97,8 @@ TEST_F(SimulationFiles, ResolvedConfigurationFliesTheSameFlight) {
   Section root = section("flight: {start_bearing_deg: 77}\n");
   const Simulation one = read_simulation(root);
   const Simulation other = read_simulation(Section::parse(root.resolved(), folder_ / "again.yaml"));
+  EXPECT_NEAR(one.flight.start_bearing, 77 * M_PI / 180, 4 * kEpsilon);
+  EXPECT_NEAR(one.flight.yaw_drift, DescentOptions{}.yaw_drift, kEpsilon);
   // Degrees and radians are converted once more: rounding.
   EXPECT_NEAR(one.flight.start_bearing, other.flight.start_bearing, 4 * kEpsilon);
   EXPECT_NEAR(one.flight.yaw_drift, other.flight.yaw_drift, 4 * kEpsilon);
