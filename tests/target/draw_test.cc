@@ -1,8 +1,12 @@
 #include "perch/target/draw.h"
 
-#include <functional>
+#include <gtest/gtest.h>
 
-#include "support/rng.h"
+#include <functional>
+#include <optional>
+#include <set>
+#include <utility>
+
 #include "target/raster.h"
 
 namespace perch {
@@ -88,30 +92,38 @@ TEST(Draw, NeighbouringModulesOfATagShowNoSeam) {
   }
 }
 
-TEST(Draw, TilesShowTheTargetOnceAndInPlace) {
-  const LandingTarget target = read_target(kTargets / "nested.yaml");
+TEST(Draw, TilesTogetherShowEveryEdgeInItsPlace) {
+  const LandingTarget target = read_target(kTargets / "sharp.yaml");
   const SheetPlan plan = plan_sheets(printed_bounds(target), Paper::kA4);
-  const Raster whole = raster_of(target, 1000, 0.0);
-  TestRng rng;
-  for (size_t i = 0; i < plan.sheets.size(); ++i) {
-    const Sheet& sheet = plan.sheets[i];
-    const PageRaster page(plan.page, 4, [&](cairo_t* cr) { draw_sheet(cr, target, plan, i); });
-    for (int n = 0; n < 200; ++n) {
-      const double x = rng.uniform(0.5, sheet.window_size.width - 0.5);
-      const double y = rng.uniform(0.5, sheet.window_size.height - 0.5);
-      const Eigen::Vector2d p = (sheet.drawing + Eigen::Vector2d(x, -y)) / 1000;
-      if (p.cwiseAbs().maxCoeff() > 0.499) continue;  // off the target, or on its cut line
-      const int expected = whole.at(p), found = page.at_mm(sheet.window.x() + x, sheet.window.y() + y);
-      // Pixels on an edge are grey in both pictures and differ.
-      if (expected != 0 && expected != 255) continue;
-      if (found != 0 && found != 255) continue;
-      const bool near_edge =
-          std::abs(std::remainder(p.x(), 0.05)) < 1e-3 || std::abs(std::remainder(p.y(), 0.05)) < 1e-3;
-      const bool near_inner = p.x() > 0.04 && p.x() < 0.21 && p.y() > 0.04 && p.y() < 0.21;
-      if (near_edge || near_inner) continue;
-      EXPECT_EQ(found, expected) << tile_name(sheet) << " at " << p.transpose();
+  constexpr double kSide = 0.5;  // mm from an edge: two pixels, so that none is grey
+  std::set<std::pair<size_t, double>> seen;
+  for (size_t n = 0; n < plan.sheets.size(); ++n) {
+    const Sheet& sheet = plan.sheets[n];
+    const PageRaster page(plan.page, 4, [&](cairo_t* cr) { draw_sheet(cr, target, plan, n); });
+    // The colour at a point of the drawing, mm; nothing where this sheet does not show it.
+    const auto grey_at = [&](const Eigen::Vector2d& p) -> std::optional<int> {
+      const double x = p.x() - sheet.drawing.x(), y = sheet.drawing.y() - p.y();
+      if (std::min(x, y) < kSide || x > sheet.window_size.width - kSide ||
+          y > sheet.window_size.height - kSide) {
+        return std::nullopt;
+      }
+      return page.at_mm(sheet.window.x() + x, sheet.window.y() + y);
+    };
+    for (size_t i = 0; i < target.features.size(); ++i) {
+      const size_t next = i % 4 == 3 ? i - 3 : i + 1;
+      const Eigen::Vector2d a = 1000 * target.features[i].point, b = 1000 * target.features[next].point;
+      const Eigen::Vector2d along = (b - a).normalized(), outward(along.y(), -along.x());
+      for (const double t : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+        const auto inside = grey_at(a + t * (b - a) - kSide * outward);
+        const auto outside = grey_at(a + t * (b - a) + kSide * outward);
+        if (!inside || !outside) continue;
+        EXPECT_EQ(*inside, 255) << tile_name(sheet) << ' ' << target.features[i].name << ' ' << t;
+        EXPECT_EQ(*outside, 0) << tile_name(sheet) << ' ' << target.features[i].name << ' ' << t;
+        seen.insert({i, t});
+      }
     }
   }
+  EXPECT_EQ(seen.size(), 24u * 5u);
 }
 
 TEST(Draw, NoInkReachesThePageMargin) {
