@@ -69,25 +69,25 @@ TEST(Draw, AModuleIsSizeOverModulesToAFractionOfAPixel) {
 }
 
 TEST(Draw, NeighbouringModulesOfATagShowNoSeam) {
-  // 23.7 px a tag: no module begins with a pixel. Between white neighbours in a row of data, and between
-  // rows, all must be white: tag36h11's id 0 has a white block of 2 x 2 modules; look for any seam in all of
-  // it.
-  const LandingTarget target =
-      read_target(Section::parse("type: apriltag\nfamily: tag36h11\ntags: [{id: 0, size: 0.8}]\n", "t.yaml"));
-  const Raster raster = raster_of(target, 237 / 0.8, 0, 1);
-  const Raster doubled = raster_of(target, 16 / 0.8, 0, 1);  // two whole pixels a module: no grey at all
-  for (const uint8_t grey : doubled.grey) EXPECT_TRUE(grey == 0 || grey == 255) << int{grey};
-  for (int row = 1; row + 1 < 20; ++row) {
-    for (int column = 1; column + 1 < 20; ++column) {
-      // A point at the corner of four pixels of one colour is inside that colour.
-      const auto at = [&](int r, int c) { return doubled.grey[static_cast<size_t>(r * doubled.width + c)]; };
-      if (at(row, column) != at(row - 1, column) || at(row, column) != at(row, column - 1) ||
-          at(row, column) != at(row - 1, column - 1)) {
-        continue;
+  // Both are 10 modules of 0.1 m; the second has data on both sides of a white border.
+  for (const char* tag : {"family: tag36h11\ntags: [{id: 0, size: 0.8}]",
+                          "family: tagCustom48h12\ntags: [{id: 0, size: 0.6}]"}) {
+    const LandingTarget target = read_target(Section::parse(std::string("type: apriltag\n") + tag, "t.yaml"));
+    // 29.6 px a module: hardly one begins with a pixel, so seams show. Two whole pixels: no grey at all.
+    const Raster raster = raster_of(target, 296, 0, 1);
+    const Raster exact = raster_of(target, 20, 0, 1);
+    for (const uint8_t grey : exact.grey) EXPECT_TRUE(grey == 0 || grey == 255) << int{grey};
+    for (int row = 1; row < 20; ++row) {
+      for (int column = 1; column < 20; ++column) {
+        const auto at = [&](int r, int c) { return exact.grey[static_cast<size_t>(r * exact.width + c)]; };
+        // A point between four pixels of one colour is inside that colour.
+        const int colour = at(row, column);
+        if (at(row - 1, column) != colour || at(row, column - 1) != colour ||
+            at(row - 1, column - 1) != colour)
+          continue;
+        EXPECT_EQ(raster.at(Eigen::Vector2d(-0.5 + column * 0.05, 0.5 - row * 0.05)), colour)
+            << tag << " at " << row << ' ' << column;
       }
-      const double module = 0.8 / 8;
-      const Eigen::Vector2d p(-0.5 + column * module / 2, 0.5 - row * module / 2);
-      EXPECT_EQ(raster.at(p), at(row, column)) << row << ' ' << column;
     }
   }
 }

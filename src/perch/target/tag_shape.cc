@@ -55,14 +55,7 @@ TagShape tag_shape(const apriltag_family_t& family, int id, int border) {
     add_runs(cells, true, shape.edge, shape.patches);
     return shape;
   }
-  // A black ring around a white one, a module each, and data inside and outside of them.
   shape.footprint = family.total_width;
-  shape.patches.push_back({centred_square(shape.edge + 2), false});
-  shape.patches.push_back({centred_square(shape.edge), true});
-  shape.patches.push_back({centred_square(shape.edge - 2 * border), false});
-  add_runs(cells, false, shape.edge, shape.patches);
-  add_runs(cells, true, shape.edge, shape.patches);
-
   // How far the nearest datum inside the white ring is from the centre, along the axis it is farther on.
   double nearest = shape.edge / 2 - border;
   for (const DataCell& cell : cells) {
@@ -71,6 +64,20 @@ TagShape tag_shape(const apriltag_family_t& family, int id, int border) {
     nearest = std::min(nearest, std::max(x, y));
   }
   shape.free_centre = std::max(0.0, 2 * nearest);
+
+  // A black ring around a white one, a module each, and data inside and outside of them. No colour
+  // is painted over the other next to its own: antialiasing would leave a line where they meet.
+  std::vector<DataCell> inner, outer;
+  for (const DataCell& cell : cells) {
+    const bool inside = std::min(cell.column, cell.row) >= 0 && std::max(cell.column, cell.row) < shape.edge;
+    (inside ? inner : outer).push_back(cell);
+  }
+  shape.patches.push_back({centred_square(shape.edge + 2), false});
+  add_runs(outer, false, shape.edge, shape.patches);
+  shape.patches.push_back({centred_square(shape.edge), true});
+  add_runs(outer, true, shape.edge, shape.patches);
+  if (shape.free_centre > 0) shape.patches.push_back({centred_square(shape.free_centre), false});
+  add_runs(inner, false, shape.edge, shape.patches);
   return shape;
 }
 

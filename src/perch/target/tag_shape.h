@@ -11,7 +11,7 @@ namespace perch {
 // Where the ink of a tag goes, in the tag's own modules: origin at its centre, x right, y up as it is
 // printed.
 struct TagShape {
-  // Painted in this order; the data come last.
+  // Painted in this order.
   std::vector<Patch> patches;
   double edge = 0;       // side of the square whose corners libapriltag reports
   double footprint = 0;  // side of all the tag needs but the quiet zone
