@@ -71,25 +71,21 @@ size_t columns(const std::string& line) {
 }
 
 TEST(Summary, CsvHasAsManyFieldsAsItsHeader) {
-  std::vector<FlightScore> scores;
-  for (const FlightResult& flight : odd_flights()) scores.push_back(score_flight(flight));
-  scores.back().name = "plain";  // a line break in a name is quoted, which this reader does not know
-  std::istringstream csv(summary_csv(scores));
-  std::string header, line;
-  std::getline(csv, header);
-  size_t rows = 0;
-  for (; std::getline(csv, line); ++rows) {
-    EXPECT_EQ(columns(line), columns(header)) << line;
-    EXPECT_THAT(line, Not(HasSubstr("nan")));
-    EXPECT_THAT(line, Not(HasSubstr("inf")));
+  for (const FlightResult& flight : odd_flights()) {
+    FlightScore score = score_flight(flight);
+    score.name = "plain";
+    const std::string row = summary_csv_row(score);
+    EXPECT_EQ(columns(row), columns(summary_csv_header())) << row;
+    EXPECT_EQ(row.back(), '\n');
+    EXPECT_THAT(row, Not(HasSubstr("nan")));
+    EXPECT_THAT(row, Not(HasSubstr("inf")));
   }
-  EXPECT_EQ(rows, scores.size());
 }
 
 TEST(Summary, CsvQuotesANameWithAComma) {
   FlightScore score;
   score.name = "a,\"b\"";
-  EXPECT_THAT(summary_csv(std::span(&score, 1)), HasSubstr("\n\"a,\"\"b\"\"\","));
+  EXPECT_EQ(summary_csv_row(score).rfind("\"a,\"\"b\"\"\",", 0), 0u);
 }
 
 TEST(Summary, ErrorsAreARowForEachComparedFrame) {

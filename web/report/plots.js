@@ -70,7 +70,7 @@ function axis(label, more) {
 }
 
 const yAxis = (label, more) => axis(label, Object.assign({
-  size: 52, values: (plot, ticks) => ticks.map((v) => String(+v.toPrecision(6)).replace('-', '−')),
+  size: 52, values: (plot, ticks) => ticks.map((v) => (v == null ? '' : String(+v.toPrecision(6)).replace('-', '−'))),
 }, more));
 
 // A line; `count` decides whether single points can be told apart.
@@ -94,12 +94,12 @@ function place(parent, options, data) {
 }
 
 // One plot against time in a group. `series` without the time's own.
-function timePlot(parent, group, {label, series, bands, data, height, scales, axes, drawUnder, drawOver}) {
+function timePlot(parent, group, {label, series, bands, data, height = 210, scales, axes, drawUnder, drawOver}) {
   const options = {
     height,
     scales: Object.assign({x: {time: false}}, scales),
     axes: axes || [axis('time [s]', {size: 28}), yAxis(label)],
-    series: [{label: 's', value: (plot, v) => (v == null ? '–' : v.toFixed(3))}, ...series],
+    series: [{label: 'time', value: (plot, v) => (v == null ? '–' : v.toFixed(3) + ' s')}, ...series],
     bands,
     cursor: {
       sync: {key: group.key, setSeries: false, scales: ['x', null],
@@ -131,10 +131,11 @@ function statusStrip(parent, group, times, status) {
       for (let i = 0; i < status.length; ++i) {
         if ((status[i] === '0') !== (pass === 0)) continue;
         const end = i + 1 < times.length ? Math.min(times[i + 1], times[i] + 3 * typical) : times[i] + typical;
-        const x0 = plot.valToPos(times[i], 'x', true);
-        const x1 = plot.valToPos(end, 'x', true);
+        // Whole pixels: two half-covered ones would let the page shine through between frames.
+        const x0 = Math.floor(plot.valToPos(times[i], 'x', true));
+        const x1 = Math.ceil(plot.valToPos(end, 'x', true));
         ctx.fillStyle = statusColour(+status[i]);
-        ctx.fillRect(x0, bbox.top, Math.max(1, x1 - x0 + 0.5), bbox.height);
+        ctx.fillRect(x0, bbox.top, Math.max(1, x1 - x0), bbox.height);
       }
     }
     ctx.restore();
@@ -177,7 +178,7 @@ function scatterPlot(parent, ranges, errors, bins) {
     scales: {x: {time: false, range: [low, high]},
              y: {range: (plot, min, max) => [0, (max || 1) * 1.05]}},
     axes: [axis('distance camera to target [m]', {size: 28}), yAxis('position error [cm]')],
-    series: [{label: 'm', value: (plot, v) => short(v)},
+    series: [{label: 'distance', value: (plot, v) => short(v) + ' m'},
              {label: 'position error', stroke: theme('vision'), paths: () => null,
               points: {show: true, size: 4, fill: theme('vision'), stroke: theme('vision'), width: 0}, value: (plot, v) => short(v) + ' cm'}],
     cursor: {drag: {x: false, y: false}},

@@ -6,6 +6,7 @@ const STATES = ['x', 'y', 'z', 'yaw', 'pitch', 'roll'];
 const isAngle = (i) => i >= 3;
 const shownScale = (i) => (isAngle(i) ? DEG : 100);  // rad to degrees, m to cm
 const shownUnit = (i) => (isAngle(i) ? '°' : 'cm');
+const withUnit = (number, i) => number + (isAngle(i) ? '°' : ' cm');
 
 // What the paper reached at 320 x 240 and about 1 m (its figure 3.5), cm and degrees.
 const PAPER_RMS = [4.9, 2.9, 3.6, 4.4, 3.3, 1.1];
@@ -24,8 +25,9 @@ function element(tag, attributes = {}, ...children) {
 const percent = (fraction, digits = 1) => (fraction == null ? '–' : (100 * fraction).toFixed(digits) + ' %');
 const signed = (value) => (value > 0 ? '+' : '') + short(value);
 const scaled = (value, scale) => (value == null ? null : value * scale);
-const cm = (metres) => short(scaled(metres, 100)) + ' cm';
-const deg = (rad) => short(scaled(rad, DEG)) + '°';
+const cm = (metres) => (metres == null ? '–' : short(100 * metres) + ' cm');
+const deg = (rad) => (rad == null ? '–' : short(DEG * rad) + '°');
+const ms = (us) => (us == null ? '–' : short(us / 1000) + ' ms');
 const plural = (count, word) => `${count} ${word}${count === 1 ? '' : 's'}`;
 
 function section(title, note, ...children) {
@@ -72,7 +74,7 @@ function inWords(summary) {
     const longest = detection.gaps.reduce((a, b) => (b.duration_s > a.duration_s ? b : a));
     words.push(`The longest of ${plural(detection.gaps.length, 'gap')} is ${plural(longest.frames, 'frame')} (${short(longest.duration_s)} s) at ${short(longest.start_s)} s.`);
   }
-  if (summary.total_us.mean != null) words.push(`A frame takes ${short(summary.total_us.mean / 1000)} ms.`);
+  if (summary.total_us.mean != null) words.push(`A frame takes ${ms(summary.total_us.mean)}.`);
   return words.join(' ');
 }
 
@@ -80,12 +82,12 @@ function tiles(summary) {
   const {errors, consistency} = summary;
   const all = [
     ['detection rate', percent(summary.detection.rate), `${summary.detection.counts.ok} of ${summary.frames}`],
-    ['position RMS', errors.position_m.rms == null ? null : cm(errors.position_m.rms), `95 % below ${cm(errors.position_m.p95)}`],
-    ['over distance', errors.position_over_range_rms == null ? null : percent(errors.position_over_range_rms, 2), 'RMS of error / range'],
-    ['attitude RMS', errors.rotation_rad.rms == null ? null : deg(errors.rotation_rad.rms), `95 % below ${deg(errors.rotation_rad.p95)}`],
+    ['position RMS', errors.position_m.rms == null ? null : cm(errors.position_m.rms), `95 % ≤ ${cm(errors.position_m.p95)}`],
+    ['over distance', errors.position_over_range_rms == null ? null : percent(errors.position_over_range_rms, 2), 'error / range, RMS'],
+    ['attitude RMS', errors.rotation_rad.rms == null ? null : deg(errors.rotation_rad.rms), `95 % ≤ ${deg(errors.rotation_rad.p95)}`],
     ['mean NEES', consistency.mean_nees == null ? null : short(consistency.mean_nees), '6 is honest'],
     ['reprojection', summary.reprojection_rms_px.rms == null ? null : short(summary.reprojection_rms_px.rms) + ' px', 'RMS'],
-    ['time a frame', summary.total_us.mean == null ? null : short(summary.total_us.mean / 1000) + ' ms', `99 % below ${short(scaled(summary.total_us.p99, 1e-3))} ms`],
+    ['time a frame', summary.total_us.mean == null ? null : ms(summary.total_us.mean), `99 % ≤ ${ms(summary.total_us.p99)}`],
   ];
   return element('dl', {class: 'tiles'}, ...all.filter((tile) => tile[1]).map(([name, value, note]) =>
       element('div', {}, element('dt', {}, name), element('dd', {}, value), element('small', {}, note))));
@@ -103,8 +105,8 @@ function statePlots(flight, group) {
   const compared = frames.navigation.some((column) => column.some((v) => v != null));
   const under = shadeGaps(frames.time_s, frames.status);
   const grid = element('div', {class: 'six'});
-  for (const i of [0, 3, 1, 4, 2, 5]) {  // positions left, angles right, as the paper has them
-    const parent = grid.appendChild(element('figure', {}, element('figcaption', {}, STATES[i])));
+  for (let i = 0; i < 6; ++i) {
+    const parent = grid.appendChild(element('figure'));
     let navigation = frames.navigation[i], vision = frames.vision[i];
     if (isAngle(i)) {
       navigation = unwrap(navigation);
@@ -131,8 +133,8 @@ function residualPlots(flight, group) {
   const {frames} = flight;
   const under = shadeGaps(frames.time_s, frames.status);
   const grid = element('div', {class: 'six'});
-  for (const i of [0, 3, 1, 4, 2, 5]) {
-    const parent = grid.appendChild(element('figure', {}, element('figcaption', {}, STATES[i])));
+  for (let i = 0; i < 6; ++i) {
+    const parent = grid.appendChild(element('figure'));
     const error = frames.error_cm_deg[i];
     const sigma = frames.sigma_cm_deg[i];
     const bound = (sign) => sigma.map((s, k) => (s == null || error[k] == null ? null : sign * 2 * s));
@@ -159,9 +161,9 @@ function rmsBars(summary) {
     return element('div', {class: 'bars'}, ...states.flatMap((i, k) => [
       element('b', {}, STATES[i]),
       element('div', {class: 'bar'},
-          element('div', {class: 'paper', style: width(PAPER_RMS[i])}, element('span', {}, `paper ${PAPER_RMS[i]} ${shownUnit(i)}`)),
+          element('div', {class: 'paper', style: width(PAPER_RMS[i])}, element('span', {}, 'paper ' + withUnit(PAPER_RMS[i], i))),
           element('div', {class: 'rms', style: width(values[k][0])}), element('div', {class: 'noise', style: width(values[k][1])})),
-      element('span', {class: 'values'}, element('b', {}, `${short(values[k][0])} ${shownUnit(i)}`),
+      element('span', {class: 'values'}, element('b', {}, withUnit(short(values[k][0]), i)),
           element('small', {}, `${short(values[k][1])} without DC`)),
     ]));
   };
@@ -173,9 +175,9 @@ function rmsBars(summary) {
 
 function errorTable(summary) {
   const rows = STATES.map((state, i) => {
-    const e = summary.errors[state], s = shownScale(i), unit = ' ' + shownUnit(i);
-    return [state, short(scaled(e.rms, s)) + unit, signed(scaled(e.dc_offset, s)) + unit, short(scaled(e.rms_without_dc_offset, s)) + unit,
-            short(scaled(e.median, s)) + unit, short(scaled(e.p95, s)) + unit, short(scaled(e.max, s)) + unit];
+    const e = summary.errors[state];
+    const cell = (value, format = short) => withUnit(format(scaled(value, shownScale(i))), i);
+    return [state, cell(e.rms), cell(e.dc_offset, signed), cell(e.rms_without_dc_offset), cell(e.median), cell(e.p95), cell(e.max)];
   });
   const size = (name, e, shown) => [name, shown(e.rms), '', '', shown(e.median), shown(e.p95), shown(e.max)];
   rows.push(size('position', summary.errors.position_m, cm), size('attitude', summary.errors.rotation_rad, deg));
@@ -223,7 +225,7 @@ function consistencyPlot(flight, group) {
     data: [frames.time_s, constant(1.2373), constant(14.4494), constant(6), frames.nees.map((v) => (v > 0 ? v : null))],
   }));
   const [low, high] = c.mean_nees_bounds_95;
-  const verdict = c.mean_nees > high ? 'vision is less accurate than it claims, or navigation is.' : c.mean_nees < low ? 'vision is more accurate than it claims.' : 'as honest as it can be told.';
+  const verdict = c.mean_nees > high ? 'vision, or navigation, is less accurate than vision claims.' : c.mean_nees < low ? 'vision is more accurate than it claims.' : 'as honest as it can be told.';
   return section('Consistency', `Mean NEES ${short(c.mean_nees)} over ${plural(c.count ?? c.frames, 'frame')}; an honest covariance gives 6, with independent frames within ${short(low)} to ${short(high)} 95 times of 100: ${verdict} Within the single frame’s bounds, 1.24 to 14.4: ${percent(c.fraction_of_frames_inside_95)} (95 % when honest). Navigation’s own noise is not in it.`, parent);
 }
 
@@ -284,7 +286,7 @@ function overview(flights, choose) {
     const e = summary.errors;
     const name = element('a', {href: '#' + i, onclick: (event) => { event.preventDefault(); choose(i); }}, summary.flight || `flight ${i}`);
     return [name, String(summary.frames), percent(summary.detection.rate), cm(e.position_m.rms), percent(e.position_over_range_rms, 2), deg(e.rotation_rad.rms),
-            short(summary.consistency.mean_nees), short(scaled(summary.total_us.mean, 1e-3)) + ' ms', String(summary.problems.length)];
+            short(summary.consistency.mean_nees), ms(summary.total_us.mean), String(summary.problems.length)];
   });
   return section(plural(flights.length, 'flight'), null,
       table(['flight', 'frames', 'with a pose', 'position RMS', 'over distance', 'attitude RMS', 'mean NEES', 'time a frame', 'problems'], rows, {class: 'overview'}));

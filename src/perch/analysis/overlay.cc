@@ -57,8 +57,8 @@ cv::Rect crop_about(const std::vector<Line>& lines, const cv::Size& size, const 
 void draw_line(cv::Mat& shown, const View& view, const Line& line) {
   std::vector<cv::Point> points;
   for (const Eigen::Vector2d& pixel : line) points.push_back(view.shown(pixel));
-  cv::polylines(shown, points, false, kUnder, 3, cv::LINE_AA, kShift);
-  cv::polylines(shown, points, false, kOutline, 1, cv::LINE_AA, kShift);
+  cv::polylines(shown, points, false, kUnder, 4, cv::LINE_AA, kShift);
+  cv::polylines(shown, points, false, kOutline, 2, cv::LINE_AA, kShift);
 }
 
 void draw_measured(cv::Mat& shown, const View& view, const Correspondence& measured) {

@@ -12,7 +12,7 @@ namespace perch {
 
 struct OverlayOptions {
   int width_px = 480;     // of the result, at most; never wider than the picture
-  double margin = 0.25;   // round the target, of its extent in the picture
+  double margin = 0.12;   // round the target, of its extent in the picture
   int jpeg_quality = 82;  // 25 to 40 kB a picture: tens of them make no report heavy
 };
 

@@ -134,31 +134,37 @@ nlohmann::ordered_json summary_json(const FlightScore& score) {
           {"problems", score.problems}};
 }
 
-std::string summary_csv(std::span<const FlightScore> scores) {
-  std::ostringstream csv;
-  csv << "flight,comparison,frames,ok,detection_rate [],compared_frames";
+std::string summary_csv_header() {
+  std::string csv = "flight,comparison,frames,ok,detection_rate [],compared_frames";
   for (const char* kind : {"rms", "dc_offset", "rms_without_dc_offset"}) {
-    for (size_t i = 0; i < 6; ++i)
-      csv << ',' << kStateNames[i] << '_' << kind << (is_angle(i) ? " [rad]" : " [m]");
+    for (size_t i = 0; i < 6; ++i) {
+      csv += ',';
+      csv += kStateNames[i];
+      csv += '_';
+      csv += kind;
+      csv += is_angle(i) ? " [rad]" : " [m]";
+    }
   }
-  csv << ",position_rms [m],position_median [m],position_p95 [m],position_max [m],rotation_rms [rad]"
+  return csv +
+         ",position_rms [m],position_median [m],position_p95 [m],position_max [m],rotation_rms [rad]"
          ",position_over_range_rms [],mean_nees [],nees_inside_95 [],reprojection_rms [px]"
          ",total_mean [us],total_p99 [us],problems\n";
-  for (const FlightScore& score : scores) {
-    csv << csv_field(score.name) << ',' << to_string(score.comparison) << ',' << score.frames.size() << ','
-        << score.detections.counts[0] << csv_number(score.detections.rate) << ',' << score.position.count;
-    for (const Statistics& s : score.states) csv << csv_number(s.rms);
-    for (const Statistics& s : score.states) csv << csv_number(s.mean);
-    for (const Statistics& s : score.states) csv << csv_number(s.rms_without_mean);
-    for (const double value :
-         {score.position.rms, score.position.median, score.position.p95, score.position.max,
-          score.rotation.rms, score.relative_position_rms, score.consistency.mean_nees,
-          score.consistency.fraction_inside, score.reprojection_px.rms, score.costs.total_us.mean,
-          score.costs.total_us.p99}) {
-      csv << csv_number(value);
-    }
-    csv << ',' << score.problems.size() << '\n';
+}
+
+std::string summary_csv_row(const FlightScore& score) {
+  std::ostringstream csv;
+  csv << csv_field(score.name) << ',' << to_string(score.comparison) << ',' << score.frames.size() << ','
+      << score.detections.counts[0] << csv_number(score.detections.rate) << ',' << score.position.count;
+  for (const Statistics& s : score.states) csv << csv_number(s.rms);
+  for (const Statistics& s : score.states) csv << csv_number(s.mean);
+  for (const Statistics& s : score.states) csv << csv_number(s.rms_without_mean);
+  for (const double value :
+       {score.position.rms, score.position.median, score.position.p95, score.position.max, score.rotation.rms,
+        score.relative_position_rms, score.consistency.mean_nees, score.consistency.fraction_inside,
+        score.reprojection_px.rms, score.costs.total_us.mean, score.costs.total_us.p99}) {
+    csv << csv_number(value);
   }
+  csv << ',' << score.problems.size() << '\n';
   return csv.str();
 }
 

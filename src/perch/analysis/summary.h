@@ -1,7 +1,6 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
-#include <span>
 #include <string>
 
 #include "perch/analysis/score.h"
@@ -14,8 +13,9 @@ namespace perch {
 // summary.json of one flight. SI units, times of stages in us; unit and meaning are in the keys.
 nlohmann::ordered_json summary_json(const FlightScore& score);
 
-// A row a flight, with a header that names the units.
-std::string summary_csv(std::span<const FlightScore> scores);
+// summary.csv: a header that names the units, and a row a flight. Each with its line's end.
+std::string summary_csv_header();
+std::string summary_csv_row(const FlightScore& score);
 
 // A row for each frame that both vision and navigation know.
 std::string errors_csv(const FlightScore& score);
