@@ -35,12 +35,14 @@ std::vector<double> distances_from_grid(const Detection& found, const AprilTagBo
 // Fifteen photographs of an AprilGrid with a border of two modules (shared/flights/real_mocap). Nearly all of
 // the 36 tags are in view: in the 14th the picture's edge cuts two, in the 15th a row of six. Motion-capture
 // markers lie on the grid's corners (tags 0, 5, 30, 35), and the lamp's reflection takes contrast from the
-// right side of some. Most of what is missing is lost otherwise: Kalibr's grid is not made for libapriltag.
-// Where blur joins a tag's corner with the black square that touches it, the two are one region and no
-// quadrilateral, or one that reaches into the square: in the ninth picture a corner is off by 6 px.
+// right side of some.
+// Most of what is missing is lost otherwise: Kalibr's grid is not made for libapriltag. Where blur joins a
+// tag's corner with the black square that touches it, the two are one region and no quadrilateral, or one
+// that reaches into the square; such tags, a corner up to 7 px off, are refused by their borders (12 of 412,
+// 3 of 438).
 //
-//   decimate 2: 20 24 30 18 31 34 28 33 23 24 24 35 34 24 30 of 36 tags, 412 of 540 in all
-//   decimate 1: 27 28 30 27 33 31 32 30 22 25 24 34 34 31 30,            438
+//   decimate 2: 19 24 27 16 31 34 28 32 21 23 24 35 34 22 30 of 36 tags, 400 of 540 in all
+//   decimate 1: 27 28 30 27 33 30 32 30 21 24 24 34 34 31 30,            435
 TEST(AprilTagRecorded, TheGridIsSeenInEveryPictureAndLiesInItsPlane) {
   const auto flight = shared_flight("real_mocap");
   if (flight.empty()) GTEST_SKIP() << "no real_mocap";
@@ -60,18 +62,20 @@ TEST(AprilTagRecorded, TheGridIsSeenInEveryPictureAndLiesInItsPlane) {
     for (const Correspondence& c : found.correspondences) tags.insert(c.feature / 4);
     const std::vector<double> distances = distances_from_grid(found, board, camera);
     std::printf("%s: %2zu tags\n", file.filename().c_str(), distances.size() / 4);
-    ASSERT_GE(distances.size(), 4 * 18u) << file;
-    // A wrong label or a wrong border would be off by a module, some 4 px, everywhere.
+    ASSERT_GE(distances.size(), 4 * 16u) << file;
+    // Measured: up to 0.57 px. A wrong label or a wrong border would be off by a module, some 4 px,
+    // everywhere.
     EXPECT_LE(distances[distances.size() / 2], 0.6) << file;
     all.insert(all.end(), distances.begin(), distances.end());
   }
-  EXPECT_GE(all.size(), 4 * 410u);
+  EXPECT_GE(all.size(), 4 * 398u);
   EXPECT_EQ(tags.size(), 36u) << "each tag is seen at least once";
   std::sort(all.begin(), all.end());
-  // Measured: median 0.35 px, 90 % within 0.70 px. sigma_px = 0.25 makes that 0.29 and 0.54 for two
-  // coordinates.
+  // Measured: median 0.35 px, 90 % within 0.65 px, all within 2.9 px. sigma_px = 0.3 makes the first two 0.35
+  // and 0.64 for two coordinates.
   EXPECT_LE(all[all.size() / 2], 0.40);
-  EXPECT_LE(all[all.size() * 9 / 10], 0.80);
+  EXPECT_LE(all[all.size() * 9 / 10], 0.72);
+  EXPECT_LE(all.back(), 3.2);
 }
 
 }  // namespace

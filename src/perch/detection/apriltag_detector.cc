@@ -7,6 +7,7 @@
 #include <string>
 
 #include "perch/detection/stopwatch.h"
+#include "perch/detection/tag_border.h"
 #include "perch/target/tag_family.h"
 
 namespace perch {
@@ -70,11 +71,11 @@ DetectorHandle make_detector(const AprilTagOptions& options, apriltag_family_t* 
   return detector;
 }
 
-// Refined, the corners of a photographed AprilGrid scatter by 0.27 px a coordinate about the grid
-// (real_mocap; the outliers included); painted ones by 0.04 px: print, lens and sharpening cost more than
-// noise. Without refinement come the steps of the picture that was searched, measured as 0.3 of one.
+// Refined, the corners of a photographed AprilGrid scatter by 0.3 px a coordinate about the grid
+// (real_mocap); painted ones by 0.04 px: print, lens and the camera's sharpening cost more than noise.
+// Without refinement come the steps of the picture that was searched, measured as a quarter of one.
 double corner_sigma_px(const AprilTagOptions& options) {
-  constexpr double kEdgePx = 0.25, kSearchSteps = 0.25;
+  constexpr double kEdgePx = 0.3, kSearchSteps = 0.25;
   return options.refine_edges ? kEdgePx : std::hypot(kEdgePx, kSearchSteps * options.quad_decimate);
 }
 
@@ -99,7 +100,7 @@ struct AprilTagDetector::Library {
 
   DetectionsHandle run(const cv::Mat& grey);
   const cv::Mat& safe_picture(const cv::Mat& grey);
-  bool trusted(const apriltag_detection_t& tag) const;
+  bool trusted(const apriltag_detection_t& tag, const cv::Mat& grey) const;
 
   struct Sighting {
     int count = 0;
@@ -137,14 +138,16 @@ DetectionsHandle AprilTagDetector::Library::run(const cv::Mat& grey) {
   return {apriltag_detector_detect(detector.get(), &image), apriltag_detections_destroy};
 }
 
-bool AprilTagDetector::Library::trusted(const apriltag_detection_t& tag) const {
+bool AprilTagDetector::Library::trusted(const apriltag_detection_t& tag, const cv::Mat& grey) const {
   if (tag.decision_margin < options.min_decision_margin)
     return false;  // max_hamming is in the decoding table
-  // An edge without any gradient along it leaves libapriltag with 0 / 0.
-  for (int k = 0; k < 4; ++k) {
-    if (!corner_pixel(tag, k).allFinite()) return false;
-  }
-  return true;
+  // In real_mocap every tag with all corners within 1 px of the grid has 0.9 or more; of the 18 with a corner
+  // more than 2 px off, 15 have less.
+  constexpr double kMinBorderAgreement = 0.9;
+  Eigen::Matrix3d H = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(tag.H->data);
+  H.topRows<2>() -= 0.5 * H.row(2).replicate<2, 1>();  // see corner_pixel
+  // An edge without any gradient along it leaves libapriltag with 0 / 0, which is nowhere in the picture.
+  return border_agreement(grey, H, family->width_at_border, has_black_border(*family)) >= kMinBorderAgreement;
 }
 
 AprilTagDetector::AprilTagDetector(const AprilTagBoard& board, const AprilTagOptions& options)
@@ -165,7 +168,7 @@ const Detection& AprilTagDetector::detect(const cv::Mat& grey, const std::option
       apriltag_detection_t* tag = nullptr;
       zarray_get(found.get(), i, &tag);
       const int index = library.tag_of_id[static_cast<size_t>(tag->id)];
-      if (index < 0 || !library.trusted(*tag)) continue;
+      if (index < 0 || !library.trusted(*tag, grey)) continue;
       Library::Sighting& sighting = library.sightings[static_cast<size_t>(index)];
       ++sighting.count;
       for (int k = 0; k < 4; ++k) sighting.corners[static_cast<size_t>(k)] = corner_pixel(*tag, k);
