@@ -6,8 +6,7 @@
 #include <memory>
 
 #include "perch/analysis/overlay.h"
-#include "perch/analysis/summary.h"
-#include "perch/config/atomic_file.h"
+#include "perch/analysis/output_files.h"
 #include "perch/estimator/estimator.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/flight.h"
@@ -78,9 +77,8 @@ void write_outputs(const fs::path& folder, const FlightResult& result, const Fli
   write_estimates(folder / "estimates.csv", result.estimates);
   write_states(folder / "states.csv", result.estimates);
   write_pad_from_body(folder / "pad_from_body.tum", result.estimates);
-  write_whole_file(folder / "errors.csv", errors_csv(score));
-  // Last: who finds it finds the others.
-  write_whole_file(folder / "summary.json", to_text(summary_json(score), 2) + "\n");
+  // Last: who finds a summary finds the rest.
+  write_flight_files(folder, score);
 }
 
 // Reads the pictures that the report shows once more: keeping all until they are chosen would take the memory of a

@@ -15,8 +15,7 @@
 
 #include "batch_flight.h"
 #include "perch/analysis/error_table.h"
-#include "perch/analysis/summary.h"
-#include "perch/config/atomic_file.h"
+#include "perch/analysis/output_files.h"
 #include "program.h"
 
 DEFINE_string(config, "", "the run's configuration, a YAML file");
@@ -155,19 +154,15 @@ int run(const CommandLine& line) {
   const auto outcomes = run_all(config, flights, folders);
 
   std::vector<ReportFlight> done;
-  std::vector<FlightScore> scores;
   bool failed = stop_requested;
   for (const auto& outcome : outcomes) {
     failed = failed || !outcome.flight;
     if (!outcome.flight) continue;
     done.push_back(*outcome.flight);
-    scores.push_back(outcome.flight->score);
-    std::cout << error_table(scores.back()) << '\n';
+    std::cout << error_table(outcome.flight->score) << '\n';
   }
-  write_whole_file(fs::path(FLAGS_output) / "summary.csv", summary_csv(scores));
-  const fs::path report = fs::path(FLAGS_output) / "report.html";
-  write_whole_file(report, report_html(done, root.resolved()));
-  std::cout << "report: " << report.string() << '\n';
+  write_run_files(FLAGS_output, done, root.resolved());
+  std::cout << "report: " << (fs::path(FLAGS_output) / "report.html").string() << '\n';
   if (stop_requested) std::cerr << "perch-batch: interrupted: what is missing was not begun or not finished\n";
   return failed ? 1 : 0;
 }

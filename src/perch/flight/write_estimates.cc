@@ -40,12 +40,6 @@ void append_pose(std::string& csv, const Rigid3& pose) {
   for (const double value : {q.w(), q.x(), q.y(), q.z()}) append_field(csv, value);
 }
 
-void write_whole(const std::filesystem::path& path, const std::string& text) {
-  AtomicFile file(path);
-  file.append(text);
-  file.commit();
-}
-
 }  // namespace
 
 std::string estimates_header() { return joined(estimate_columns()); }
@@ -108,7 +102,7 @@ void append_tum(int64_t timestamp_ns, const Rigid3& pad_from_body, std::string& 
 void write_estimates(const std::filesystem::path& file, std::span<const Estimate> estimates) {
   std::string text = estimates_header();
   for (const Estimate& estimate : estimates) append_estimate(estimate, text);
-  write_whole(file, text);
+  write_whole_file(file, text);
 }
 
 void write_states(const std::filesystem::path& file, std::span<const Estimate> estimates) {
@@ -116,7 +110,7 @@ void write_states(const std::filesystem::path& file, std::span<const Estimate> e
   for (const Estimate& estimate : estimates) {
     if (estimate.state) append_state(*estimate.state, text);
   }
-  write_whole(file, text);
+  write_whole_file(file, text);
 }
 
 void write_pad_from_body(const std::filesystem::path& file, std::span<const Estimate> estimates) {
@@ -124,7 +118,7 @@ void write_pad_from_body(const std::filesystem::path& file, std::span<const Esti
   for (const Estimate& estimate : estimates) {
     if (estimate.pad_from_body) append_tum(estimate.timestamp_ns, estimate.pad_from_body->mean, text);
   }
-  write_whole(file, text);
+  write_whole_file(file, text);
 }
 
 }  // namespace perch
