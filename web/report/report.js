@@ -113,10 +113,11 @@ function statePlots(flight, group) {
       vision = unwrap(vision, navigation);
     }
     const n = frames.time_s.length;
-    const series = [line('vision', theme('vision'), n)];
+    const value = (plot, v) => (v == null ? '–' : v.toFixed(isAngle(i) ? 2 : 3).replace('-', '−'));
+    const series = [line('vision', theme('vision'), n, {value})];
     const data = [frames.time_s, vision];
     if (compared) {
-      series.unshift(line('navigation', theme('navigation'), n, {width: 2, points: {show: false}}));
+      series.unshift(line('navigation', theme('navigation'), n, {width: 2, points: {show: false}, value}));
       data.splice(1, 0, navigation);
     }
     flight.draw.push(() => timePlot(parent, group, {
