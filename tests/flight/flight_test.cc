@@ -95,7 +95,7 @@ TEST(Flight, RefusesAMountThatIsNoRotation) {
     return problems.empty() ? "" : problems[0];
   };
   EXPECT_THAT(problem_of("1, 0, 0, 0, 0, 1.01, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1"),
-              HasSubstr("sensor.yaml:7: T_BS: expected a rotation, orthonormal to 0.001 (off by 0.0201"));
+              HasSubstr("sensor.yaml:6: T_BS: expected a rotation, orthonormal to 0.001 (off by 0.0201"));
   EXPECT_THAT(problem_of("1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1"), HasSubstr("not a mirror"));
   EXPECT_THAT(problem_of("1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1"),
               HasSubstr("0 0 0 1 as the last row"));

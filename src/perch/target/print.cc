@@ -84,11 +84,6 @@ class Canvas {
   cairo_t* context_;
 };
 
-cairo_status_t write_to_file(void* file, const unsigned char* data, unsigned int length) {
-  static_cast<AtomicFile*>(file)->stream().write(reinterpret_cast<const char*>(data), length);
-  return CAIRO_STATUS_SUCCESS;  // AtomicFile tells when it is committed
-}
-
 cairo_status_t append_to_string(void* text, const unsigned char* data, unsigned int length) {
   static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(data), length);
   return CAIRO_STATUS_SUCCESS;
@@ -104,12 +99,12 @@ void write_pdf(const std::vector<Page>& pages, const std::string& title, const f
                                " mm: take tiles (--paper) or .svg");
     }
   }
-  AtomicFile file(output);
+  std::string pdf;
   const auto points = [](const Size& size) {
     return Size{size.width * kPointsPerMm, size.height * kPointsPerMm};
   };
   const Size first = points(pages.front().size);
-  Canvas canvas(cairo_pdf_surface_create_for_stream(write_to_file, &file, first.width, first.height));
+  Canvas canvas(cairo_pdf_surface_create_for_stream(append_to_string, &pdf, first.width, first.height));
   cairo_pdf_surface_set_metadata(canvas.surface(), CAIRO_PDF_METADATA_TITLE, title.c_str());
   for (const Page& page : pages) {
     const Size size = points(page.size);
@@ -118,16 +113,16 @@ void write_pdf(const std::vector<Page>& pages, const std::string& title, const f
     cairo_show_page(canvas.context());
   }
   canvas.finish();
-  file.commit();
+  write_whole_file(output, pdf);
 }
 
 void write_svg(const Page& page, const fs::path& output) {
-  AtomicFile file(output);
-  Canvas canvas(cairo_svg_surface_create_for_stream(write_to_file, &file, page.size.width, page.size.height));
+  std::string svg;
+  Canvas canvas(cairo_svg_surface_create_for_stream(append_to_string, &svg, page.size.width, page.size.height));
   cairo_svg_surface_set_document_unit(canvas.surface(), CAIRO_SVG_UNIT_MM);
   canvas.draw(page, 1);
   canvas.finish();
-  file.commit();
+  write_whole_file(output, svg);
 }
 
 void write_png(const Page& page, double dpi, const fs::path& output) {
@@ -142,7 +137,6 @@ void write_png(const Page& page, double dpi, const fs::path& output) {
                              std::to_string(std::lround(width)) + " x " +
                              std::to_string(std::lround(height)) + ": take a smaller --dpi, --paper or .pdf");
   }
-  AtomicFile file(output);
   Canvas canvas(
       cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(width), static_cast<int>(height)));
   cairo_set_source_rgb(canvas.context(), 1, 1, 1);
@@ -151,8 +145,7 @@ void write_png(const Page& page, double dpi, const fs::path& output) {
   Canvas::check(cairo_status(canvas.context()));
   std::string png;
   Canvas::check(cairo_surface_write_to_png_stream(canvas.surface(), append_to_string, &png));
-  file.append(with_resolution(png, dpi));
-  file.commit();
+  write_whole_file(output, with_resolution(png, dpi));
 }
 
 // pad.svg, pad-overview.svg, pad-r1c1.svg, ...
