@@ -9,7 +9,19 @@ namespace {
 
 using Matrix12d = Eigen::Matrix<double, 12, 12>;
 
-double seconds(int64_t from_ns, int64_t to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-9; }
+// Of times in order. Unsigned: the difference of two times from a broken file may be too large for int64_t.
+double seconds(int64_t from_ns, int64_t to_ns) {
+  return static_cast<double>(static_cast<uint64_t>(to_ns) - static_cast<uint64_t>(from_ns)) * 1e-9;
+}
+
+// Finite, and a covariance that is one. Anything else would stay in the state for ever.
+bool is_usable(const UncertainRigid3& pose) {
+  return pose.mean.translation.allFinite() && pose.mean.rotation.coeffs().allFinite() &&
+         pose.covariance.allFinite() && Eigen::LDLT<PoseCovariance>(pose.covariance).isPositive();
+}
+
+// Both halves of what rounding has made of them: over thousands of steps they would drift apart.
+void make_symmetric(Matrix12d& P) { P = (0.5 * (P + P.transpose())).eval(); }
 
 // White acceleration of density q^2 over dt, on a position-like (row 0) and a velocity-like (row 6) state.
 void add_noise(Matrix12d& P, Eigen::Index at, double q, double dt) {
@@ -36,6 +48,7 @@ VehicleState propagate(const VehicleState& state, int64_t timestamp_ns, const Tr
   next.covariance = F * state.covariance * F.transpose();
   add_noise(next.covariance, 0, options.acceleration_noise, dt);
   add_noise(next.covariance, 3, options.angular_acceleration_noise, dt);
+  make_symmetric(next.covariance);
   return next;
 }
 
@@ -80,10 +93,11 @@ bool VehicleFilter::correct(const UncertainRigid3& pad_from_body) {
   state_->pad_from_body = perturb(state_->pad_from_body, step.head<6>());
   state_->body_velocity_in_pad += step.segment<3>(6);
   state_->body_angular_velocity_in_pad += step.tail<3>();
-  // Joseph's form: stays symmetric and positive whatever the rounding.
+  // Joseph's form: stays positive whatever the rounding.
   Matrix12d A = Matrix12d::Identity();
   A.leftCols<6>() -= K;
   P = (A * P * A.transpose() + K * pad_from_body.covariance * K.transpose()).eval();
+  make_symmetric(P);
   return true;
 }
 
@@ -99,10 +113,13 @@ std::optional<VehicleState> VehicleFilter::predict(int64_t timestamp_ns) const {
 
 std::optional<VehicleState> VehicleFilter::update(int64_t timestamp_ns,
                                                   const std::optional<UncertainRigid3>& pad_from_body) {
+  // The same frame twice: counted again, its noise would seem to average out.
+  if (state_ && state_->source == StateSource::kVision && state_->timestamp_ns == timestamp_ns) return state_;
+  const bool measured = pad_from_body && is_usable(*pad_from_body);
   const auto predicted = predict(timestamp_ns);
   if (!predicted) {
     // Not yet tracking, lost, or a clock that went back.
-    if (pad_from_body) {
+    if (measured) {
       start(timestamp_ns, *pad_from_body);
     } else if (state_) {
       state_->timestamp_ns = timestamp_ns;
@@ -111,7 +128,7 @@ std::optional<VehicleState> VehicleFilter::update(int64_t timestamp_ns,
     return state_;
   }
   state_ = predicted;
-  if (!pad_from_body) return state_;
+  if (!measured) return state_;
   if (correct(*pad_from_body)) {
     state_->source = StateSource::kVision;
     last_measured_ns_ = timestamp_ns;

@@ -38,7 +38,9 @@ class VehicleFilter {
   explicit VehicleFilter(const TrackingOptions& options) : options_(options) {}
 
   // The state at a frame's time, with the measurement of that frame where there is one. Empty before the
-  // first measurement. Times must not go back: an earlier time than the last starts anew.
+  // first measurement. Times must not go back: an earlier time than the last starts anew. A second
+  // measurement of the same time changes nothing. One that is not finite, or whose covariance is none, counts
+  // as no measurement.
   std::optional<VehicleState> update(int64_t timestamp_ns,
                                      const std::optional<UncertainRigid3>& pad_from_body);
 
