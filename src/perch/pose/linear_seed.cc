@@ -8,27 +8,27 @@
 namespace perch {
 namespace {
 
+// Points this near to a line, as a part of their extent, tell nothing across it: no detector measures better.
+constexpr double kFlat = 1e-4;
+
 // Moves the points' centroid to the origin and their mean square distance from it to 2: p -> scale (p -
 // centre).
 struct Conditioner {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double scale = 0;
+  bool spread = false;  // finite, and neither in one point nor (nearly) in a line
 
   explicit Conditioner(std::span<const Eigen::Vector2d> points) {
     for (const auto& p : points) centre += p;
     centre /= static_cast<double>(points.size());
-    double square = 0;
-    for (const auto& p : points) square += (p - centre).squaredNorm();
-    scale = std::sqrt(2 * static_cast<double>(points.size()) / square);
+    Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+    for (const auto& p : points) scatter += (p - centre) * (p - centre).transpose();
+    scale = std::sqrt(2 * static_cast<double>(points.size()) / scatter.trace());
+    // The ratio of the two eigenvalues, where it is small. Not "smaller": a NaN is no spread either.
+    spread =
+        std::isfinite(scale) && scatter.determinant() >= kFlat * kFlat * scatter.trace() * scatter.trace();
   }
   Eigen::Vector2d operator()(const Eigen::Vector2d& p) const { return scale * (p - centre); }
-  Eigen::Matrix3d matrix() const {
-    return (Eigen::Matrix3d() << scale, 0, -scale * centre.x(), 0, scale, -scale * centre.y(), 0, 0, 1)
-        .finished();
-  }
-  Eigen::Matrix3d inverse() const {
-    return (Eigen::Matrix3d() << 1 / scale, 0, centre.x(), 0, 1 / scale, centre.y(), 0, 0, 1).finished();
-  }
 };
 
 }  // namespace
@@ -37,7 +37,7 @@ std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane,
                                   std::span<const Eigen::Vector2d> image) {
   if (plane.size() != image.size() || plane.size() < 4) return std::nullopt;
   const Conditioner on_plane(plane), in_image(image);
-  if (!std::isfinite(on_plane.scale) || !std::isfinite(in_image.scale)) return std::nullopt;
+  if (!on_plane.spread || !in_image.spread) return std::nullopt;
 
   // With the rows h1, h2, h3 of H as unknowns, F'F = [S 0 -Sx; 0 S -Sy; -Sx -Sy Sxx] with S = sum q q',
   // Sx = sum x1 q q', Sy = sum x2 q q', Sxx = sum (x1^2 + x2^2) q q'.
@@ -62,7 +62,17 @@ std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane,
   const Eigen::Vector3d h3 = eigen.eigenvectors().col(0);
   Eigen::Matrix3d H;
   H << (solved_x * h3).transpose(), (solved_y * h3).transpose(), h3.transpose();
-  return pose_from_homography(in_image.inverse() * H * on_plane.matrix());
+  // Back to the units of both sides, but still about the centroid of the points: that, unlike the target's
+  // origin, is surely in front of the camera. A board of tags may lie to one side of its origin.
+  H.leftCols<2>() *= on_plane.scale;
+  H.topRows<2>() /= in_image.scale;
+  H.topRows<2>() += in_image.centre * H.row(2);
+  auto camera_from_target = pose_from_homography(H);
+  if (camera_from_target) {
+    const Eigen::Vector3d centre(on_plane.centre.x(), on_plane.centre.y(), 0);
+    camera_from_target->translation -= camera_from_target->rotation * centre;
+  }
+  return camera_from_target;
 }
 
 std::optional<Rigid3> pose_from_homography(const Eigen::Matrix3d& homography) {
