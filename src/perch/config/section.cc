@@ -25,11 +25,11 @@ struct Section::Document {
   }
 };
 
-Section::Section(std::shared_ptr<Document> document, YAML::Node node, YAML::Node resolved, std::string path,
-                 int line)
+Section::Section(std::shared_ptr<Document> document, const YAML::Node& node, const YAML::Node& resolved,
+                 std::string path, int line)
     : document_(std::move(document)),
-      node_(std::move(node)),
-      resolved_(std::move(resolved)),
+      node_(node),
+      resolved_(resolved),
       path_(std::move(path)),
       line_(line),
       known_(std::make_shared<std::set<std::string>>()) {}

@@ -104,8 +104,8 @@ class Section {
 
  private:
   struct Document;
-  Section(std::shared_ptr<Document> document, YAML::Node node, YAML::Node resolved, std::string path,
-          int line);
+  Section(std::shared_ptr<Document> document, const YAML::Node& node, const YAML::Node& resolved,
+          std::string path, int line);
 
   // The node of a key, marked as known; undefined where there is none.
   YAML::Node find(std::string_view key);

@@ -140,13 +140,13 @@ YAML::Node strict_yaml(const std::string& text, const std::filesystem::path& fil
   });
 }
 
-std::string override_yaml(YAML::Node root, const std::string& key_path_equals_value) {
+std::string override_yaml(const YAML::Node& root, const std::string& key_path_equals_value) {
   const auto refuse = [&](int, const std::string& what) {
     throw ConfigError("--set " + key_path_equals_value + ": " + what);
   };
   const size_t equals = key_path_equals_value.find('=');
   if (equals == std::string::npos) refuse(0, "expected key.path=value, found no =");
-  const std::string path = key_path_equals_value.substr(0, equals);
+  std::string path = key_path_equals_value.substr(0, equals);
   const YAML::Node value = parse(key_path_equals_value.substr(equals + 1), refuse);
 
   YAML::Node node = root;

@@ -16,8 +16,9 @@ namespace perch {
 // nested out of all measure. Throws ConfigError.
 YAML::Node strict_yaml(const std::string& text, const std::filesystem::path& file);
 
-// Puts the value of `key.path=value`, as --set gives it, in its place below `root`. Returns the key path.
-std::string override_yaml(YAML::Node root, const std::string& key_path_equals_value);
+// Puts the value of `key.path=value`, as --set gives it, in its place below `root`, which is
+// a handle of the tree: const does not protect it. Returns the key path.
+std::string override_yaml(const YAML::Node& root, const std::string& key_path_equals_value);
 
 // What is there, short enough for one line: "a mapping", "a list of 3", "nothing", or the text in quotes.
 std::string found(const YAML::Node& node);
