@@ -45,7 +45,7 @@ int join(std::vector<Component>& list, int label, int touched) {
 void label_components(RunImage& image, Components& components) {
   auto& list = components.list;
   list.clear();
-  list.push_back({0, 0, image.width, static_cast<int>(image.rows.size()), -1, -1, false});
+  list.push_back({0, 0, image.width, static_cast<int>(image.rows.size()), -1, -1, -1, false});
   const int last_row = static_cast<int>(image.rows.size()) - 1;
   for (int y = 0; y <= last_row; ++y) {
     const auto& row = image.rows[static_cast<size_t>(y)];
@@ -68,7 +68,7 @@ void label_components(RunImage& image, Components& components) {
       }
       const bool at_frame = y == 0 || y == last_row || run.begin == 0 || run.end == image.width;
       if (!white && at_frame) label = join(list, label, Components::kFrame);
-      const Component piece{0, run.end - run.begin, run.begin, y, run.end - 1, y, white};
+      const Component piece{0, run.end - run.begin, run.begin, y, run.end - 1, y, row.first + k, white};
       if (label == kNone) {
         label = static_cast<int>(list.size());
         list.push_back(piece);

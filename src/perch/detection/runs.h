@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -26,6 +27,15 @@ struct RunImage {
 
   bool is_white(const Row& row, int k) const { return row.first_white != ((k & 1) != 0); }
 };
+
+// The label of a pixel's run; x and y inside the picture.
+inline int label_at(const RunImage& image, int x, int y) {
+  const RunImage::Row& row = image.rows[static_cast<size_t>(y)];
+  const Run* first = image.runs.data() + row.first;
+  return std::upper_bound(first, first + row.count, x,
+                          [](int column, const Run& run) { return column < run.end; })
+      ->label;
+}
 
 // Thresholds every `row_step`-th row of a grey picture (CV_8UC1, not empty): white where grey > level.
 // Columns are not skipped: a row costs the same bits however many of them are looked at. `image` keeps its
