@@ -14,6 +14,7 @@ namespace perch {
 struct SeenSquare {
   Eigen::Vector2d centre;
   std::array<Eigen::Vector2d, 4> corners;
+  int component = 0;  // which it is to the caller; no label depends on it
 };
 
 // The paper's section 2.1.4. A camera in front of the face keeps the sense of rotation of any three points
@@ -26,20 +27,26 @@ struct SeenSquare {
 // such an anchor, seen by all others within half a turn, can be labelled.
 class Labelling {
  public:
-  // Empty when the layout has no such anchor.
+  // More squares than any layout has; it lets a frame be labelled without allocating.
+  static constexpr size_t kMaxSquares = 16;
+
+  // Empty when the layout has no such anchor, fewer than five squares or more than kMaxSquares.
   static std::optional<Labelling> of(const SquaresLayout& layout);
 
-  // The seen squares in the layout's order, each with its corners in the order of its features. Empty when
-  // their number is wrong or no square, or more than one, can be the anchor.
-  std::optional<std::vector<SeenSquare>> label(std::span<const SeenSquare> seen) const;
+  // Puts the seen squares into the layout's order, each with its corners in the order of its features. False,
+  // and `labelled` is empty, when their number is wrong, two are at one place, no square can be the anchor,
+  // or the others do not stand around it as they should. A picture of the mirrored target is labelled as if
+  // it were none: the layout is symmetric about the line from D to A but for the sense of rotation.
+  bool label(std::span<const SeenSquare> seen, std::vector<SeenSquare>& labelled) const;
 
  private:
   struct CornerRule {
-    int towards = 0;  // the square whose direction is the reference
-    int first = 0;    // the feature (0..3) that comes first counterclockwise from it
+    size_t towards = 0;  // the square whose direction is the reference
+    size_t first = 0;    // the feature (0..3) that comes first counterclockwise from it
   };
-  int anchor_ = 0;
-  std::vector<int> order_;                // the other squares as they come around the anchor
+  size_t anchor_ = 0;
+  std::vector<size_t> order_;             // the other squares as they come around the anchor
+  std::vector<size_t> rays_;              // how many of them lie on each ray from it
   std::vector<CornerRule> corner_rules_;  // by square
 };
 

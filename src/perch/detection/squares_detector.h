@@ -20,8 +20,11 @@ struct PaperOptions {
   int segmentation_row_step = 2;
   // Regions of fewer sampled pixels are noise (section 2.1.2). A square 2.5 px wide has 3 to 6.
   int min_component_px = 3;
-  // How far the corner of a region, the centre of a pixel inside it, lies inside the true corner: 0.65 px for
-  // the outermost pixel centre of a digitised right angle, and 0.35 px more as a threshold at 65 % leaves
+  // The paper asks that the target's region hold its components and no others, which fails where its border
+  // merges with a pale floor or wall. False: what lies in the black interior is enough.
+  bool count_region = true;
+  // How far the corner of a region, the centre of a pixel inside it, lies inside the true corner: 0.7 px for
+  // the outermost pixel centre of a digitised right angle, and 0.3 px more as a threshold at 65 % leaves
   // less of a blurred square than one halfway would. 0 is the paper's integer corner, which makes a target of
   // 50 px 5 % too small.
   double corner_inset_px = 1.0;
@@ -33,8 +36,10 @@ struct PaperOptions {
 PaperOptions read_paper_options(Section paper);
 
 // The paper's detector, chapter 2.1: threshold, two passes of connected components, four corners of each
-// square, labels. Everything beyond that (is it the target at all?) is the pose's residual to decide. Of a
-// nested target it measures the outer squares.
+// square, labels. Beyond the paper: the squares lie in the black component and that in the white border, the
+// corners of each square explain its area, and of several candidates the largest wins. Whether it is the
+// target at all is the pose's residual to decide. Of a nested target it measures the outer squares, and the
+// inner ones where these are not all in the picture.
 class SquaresDetector : public Detector {
  public:
   // Throws std::invalid_argument when the target is no layout of squares or cannot be labelled this way.
