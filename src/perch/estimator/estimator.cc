@@ -32,6 +32,7 @@ std::string unreadable(const Frame& frame, const CameraModel& camera) {
     return frame.name + ": expected a picture of the camera model's " +
            size(camera.width(), camera.height()) + " pixels, found " + size(frame.grey.cols, frame.grey.rows);
   }
+  if (frame.grey.type() != CV_8UC1) return frame.name + ": expected 8 bits of grey a pixel";
   return {};
 }
 

@@ -1,0 +1,69 @@
+#include "perch/estimator/run_config.h"
+
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "support/config_error.h"
+
+namespace perch {
+namespace {
+
+const std::filesystem::path kFolder = std::filesystem::path(PERCH_SOURCE_DIR) / "configs";
+
+RunConfig read(const std::string& text) {
+  return read_run_config(Section::parse(text, kFolder / "run.yaml"));
+}
+
+std::string complaint(const std::string& text) {
+  return std::filesystem::path(config_error([&] { read(text); })).lexically_relative(kFolder);
+}
+
+TEST(RunConfig, NeedsNothingButATarget) {
+  const RunConfig config = read("target: targets/sharp.yaml\n");
+  EXPECT_EQ(config.target.name, "sharp");
+  EXPECT_EQ(config.target.features.size(), 24u);
+  EXPECT_TRUE(config.source.empty());
+  EXPECT_TRUE(config.camera_model.empty());
+  EXPECT_EQ(config.channel, Channel::kGrey);
+  EXPECT_EQ(config.detection.paper.threshold_fraction, 0.65);
+  EXPECT_FALSE(config.frames.body_from_base);
+}
+
+TEST(RunConfig, ReadsEveryPartOfTheFile) {
+  const RunConfig config = read(R"(
+target: targets/sharp.yaml
+camera: {source: "images:*.png", model: cam.cameramodel, channel: green}
+frames: {body_from_base: identity}
+detection: {method: paper, paper: {threshold_fraction: 0.5, min_component_px: 7}}
+pose: {max_rms_sigmas: 2}
+tracking: {coast: 3}
+nav: mavlink+serial:/dev/ttyAMA0:921600
+outputs: {station: {listen: "127.0.0.1:8080"}}
+)");
+  EXPECT_EQ(config.source, "images:*.png");
+  EXPECT_EQ(config.camera_model, kFolder / "cam.cameramodel");
+  EXPECT_EQ(config.channel, Channel::kGreen);
+  EXPECT_TRUE(config.frames.body_from_base);
+  EXPECT_EQ(config.detection.paper.threshold_fraction, 0.5);
+  EXPECT_EQ(config.detection.paper.min_component_px, 7);
+  EXPECT_EQ(config.pose.max_rms_sigmas, 2);
+  EXPECT_EQ(config.tracking.coast, 3);
+}
+
+TEST(RunConfig, NamesTheLineAndTheKeyOfWhatIsWrong) {
+  EXPECT_THAT(complaint("camera: {channel: green}\n"), testing::HasSubstr("target"));
+  EXPECT_THAT(complaint("target: targets/sharp.yaml\ncamera: {channel: infrared}\n"),
+              testing::StartsWith("run.yaml:2: camera.channel: expected"));
+  EXPECT_THAT(complaint("target: targets/sharp.yaml\n\ndetection: {paper: {threshold_fraction: 1.5}}\n"),
+              testing::StartsWith("run.yaml:3: detection.paper.threshold_fraction: expected"));
+  EXPECT_THAT(complaint("target: targets/sharp.yaml\ndetection: {method: magic}\n"),
+              testing::StartsWith("run.yaml:2: detection.method: expected"));
+  EXPECT_THAT(complaint("target: targets/sharp.yaml\ncamara: {}\n"),
+              testing::StartsWith("run.yaml:2: camara"));
+  EXPECT_THAT(complaint("target: targets/sharp.yaml\ndetection: {paper: {fraction: 0.5}}\n"),
+              testing::StartsWith("run.yaml:2: detection.paper.fraction"));
+}
+
+}  // namespace
+}  // namespace perch
