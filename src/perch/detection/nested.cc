@@ -28,10 +28,10 @@ bool is_about(double ratio, double expected) {
 }
 
 // The hole, or what blooming leaves of it; what is smaller is dirt.
-bool has_hole(const Segmentation& s, int square, double hole_in_square, int min_px) {
+bool has_hole(const Segmentation& s, int square, double hole_in_square) {
   for (int label = square + 1; label < static_cast<int>(s.components.list.size()); ++label) {
     if (s.at(label).top > s.at(square).bottom) break;
-    if (s.is_noise(label, min_px) || s.around(label) != square) continue;
+    if (s.is_noise(label) || s.around(label) != square) continue;
     if (box_ratio(s.at(label), s.at(square)) > 0.5 * hole_in_square) return true;
   }
   return false;
@@ -49,8 +49,8 @@ bool is_near_edge(const Segmentation& s, const Component& border, double inner_i
 }  // namespace
 
 NestedPart nested_part(const Segmentation& s, const NestedCandidate& candidate, double hole_in_square,
-                       double inner_in_hole, int min_px) {
-  if (has_hole(s, candidate.square, hole_in_square, min_px)) return NestedPart::kOuter;
+                       double inner_in_hole) {
+  if (has_hole(s, candidate.square, hole_in_square)) return NestedPart::kOuter;
   const Component& border = s.at(candidate.border);
   // The outer one would show its hole; wherever the ring is broken, by the picture's edge or a shadow.
   if (candidate.side_px >= kHoleSureFrom) return NestedPart::kInner;

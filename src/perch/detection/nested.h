@@ -31,6 +31,6 @@ struct NestedCandidate {
 
 // `hole_in_square` and `inner_in_hole` are the layout's ratios of sides.
 NestedPart nested_part(const Segmentation& s, const NestedCandidate& candidate, double hole_in_square,
-                       double inner_in_hole, int min_px);
+                       double inner_in_hole);
 
 }  // namespace perch

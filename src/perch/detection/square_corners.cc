@@ -25,6 +25,18 @@ bool explained(const std::array<Eigen::Vector2d, 4>& corners, double pixels) {
   return std::abs(pixels - (twice_area / 2 + perimeter / 4 + 1)) <= perimeter / 2 + 0.2 * pixels;
 }
 
+// Adds the next row's end to one side of a convex outline (`side` 1: the right one, -1: the left one): the
+// ends before it that are not outside the line to it go.
+void extend(std::vector<Eigen::Vector2d>& chain, const Eigen::Vector2d& p, double side) {
+  while (chain.size() >= 2) {
+    const Eigen::Vector2d& a = chain[chain.size() - 2];
+    const Eigen::Vector2d ab = chain.back() - a, ap = p - a;
+    if (side * (ab.x() * ap.y() - ap.x() * ab.y()) > 0) break;
+    chain.pop_back();
+  }
+  chain.push_back(p);
+}
+
 }  // namespace
 
 std::optional<SeenSquare> SquareCorners::measure(const cv::Mat& grey, uint8_t level, int row_step,
@@ -43,7 +55,9 @@ std::optional<SeenSquare> SquareCorners::measure(const cv::Mat& grey, uint8_t le
   const int label = label_at(window_, column - box.x, square.top * row_step - box.y);
   const Component& whole = components_.list[static_cast<size_t>(label)];
 
-  outline_.clear();
+  // Only corners of the convex hull can be farthest in any direction: some sixteen of hundreds of row ends.
+  left_.clear();
+  right_.clear();
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double pixels = 0;
   for (int y = whole.top; y <= whole.bottom; ++y) {
@@ -59,11 +73,12 @@ std::optional<SeenSquare> SquareCorners::measure(const cv::Mat& grey, uint8_t le
     const double length = end - begin;
     pixels += length;
     sum += length * Eigen::Vector2d(0.5 * (begin + end - 1), y);
-    outline_.emplace_back(begin, y);
-    outline_.emplace_back(end - 1, y);
+    extend(left_, Eigen::Vector2d(begin, y), -1);
+    extend(right_, Eigen::Vector2d(end - 1, y), 1);
   }
+  left_.insert(left_.end(), right_.begin(), right_.end());
   const Eigen::Vector2d centre = sum / pixels;
-  const auto corners = quad_corners(outline_, centre);
+  const auto corners = quad_corners(left_, centre);
   if (!corners || !explained(*corners, pixels)) return std::nullopt;
   const Eigen::Vector2d origin(box.x, box.y);
   SeenSquare seen{centre + origin, *corners};

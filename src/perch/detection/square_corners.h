@@ -24,7 +24,7 @@ class SquareCorners {
  private:
   RunImage window_;  // the square's neighbourhood
   Components components_;
-  std::vector<Eigen::Vector2d> outline_;
+  std::vector<Eigen::Vector2d> left_, right_;  // the outline's sides
 };
 
 }  // namespace perch

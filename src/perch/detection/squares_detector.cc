@@ -1,7 +1,9 @@
 #include "perch/detection/squares_detector.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "perch/detection/grey_range.h"
 #include "perch/detection/labelling.h"
@@ -36,10 +38,12 @@ struct SquaresDetector::Work {
 
   Segmentation segmentation;
   SquareCorners corners;
-  std::vector<int> squares;  // labels of the candidate's squares
+  std::vector<int> candidates;  // labels of their interiors, the largest first
+  std::vector<int> squares;     // labels of a candidate's squares
   std::vector<SeenSquare> seen, labelled;
 
-  bool may_be_target(int interior) const;
+  bool may_be_target(int interior);
+  void find_candidates();
   std::optional<int> first_feature(int interior) const;
   bool measure_candidate(const cv::Mat& grey, uint8_t level, int interior, Stopwatch& stopwatch);
 };
@@ -70,14 +74,30 @@ SquaresDetector::~SquaresDetector() = default;
 
 // Section 2.1.2: the region holds seven white components and one black one. Which one is what, the paper
 // leaves open; six of them lie in the black one, and that in the seventh.
-bool SquaresDetector::Work::may_be_target(int interior) const {
-  const Segmentation& s = segmentation;
+bool SquaresDetector::Work::may_be_target(int interior) {
+  Segmentation& s = segmentation;
   const int n = static_cast<int>(layout.squares.size());
-  if (s.is_noise(interior, options.min_component_px) || s.at(interior).white) return false;
-  if (s.holds[static_cast<size_t>(interior)] != n || !s.at(s.around(interior)).white) return false;
-  const auto& counts = s.counts[static_cast<size_t>(s.region_of[static_cast<size_t>(interior)])];
+  if (s.holds[static_cast<size_t>(interior)] != n || s.is_noise(interior) || s.at(interior).white)
+    return false;
+  if (!s.at(s.around(interior)).white) return false;
   // Of a nested target, the hole and the inner target are counted too, from near.
-  return layout.nested || !options.count_region || (counts.white == n + 1 && counts.black == 1);
+  if (layout.nested || !options.count_region) return true;
+  const auto counts = counts_in_region_of(interior, s);
+  return counts.white == n + 1 && counts.black == 1;
+}
+
+void SquaresDetector::Work::find_candidates() {
+  candidates.clear();
+  for (int label = 1; label < static_cast<int>(segmentation.components.list.size()); ++label) {
+    if (may_be_target(label)) candidates.push_back(label);
+  }
+  const auto box = [this](int label) {
+    const Component& c = segmentation.at(label);
+    return int64_t{c.right - c.left + 1} * (c.bottom - c.top + 1);
+  };
+  std::sort(candidates.begin(), candidates.end(), [&](int a, int b) {
+    return std::pair(box(a), -a) > std::pair(box(b), -b);  // never two alike: the order is one
+  });
 }
 
 // The index of the feature that the first labelled corner is; empty when the candidate of a nested layout is
@@ -88,7 +108,7 @@ std::optional<int> SquaresDetector::Work::first_feature(int interior) const {
   const double side_px = std::sqrt(segmentation.at(square).area * options.segmentation_row_step);
   const Nested& nested = *layout.nested;
   switch (nested_part(segmentation, {segmentation.around(interior), square, side_px},
-                      nested.hole / holder_side, nested.size / nested.hole, options.min_component_px)) {
+                      nested.hole / holder_side, nested.size / nested.hole)) {
     case NestedPart::kOuter:
       return 0;
     case NestedPart::kInner:
@@ -102,7 +122,7 @@ std::optional<int> SquaresDetector::Work::first_feature(int interior) const {
 // Corners and labels of the candidate with this interior.
 bool SquaresDetector::Work::measure_candidate(const cv::Mat& grey, uint8_t level, int interior,
                                               Stopwatch& stopwatch) {
-  held_by(segmentation, interior, options.min_component_px, squares);
+  held_by(segmentation, interior, squares);
   seen.clear();
   for (const int label : squares) {
     auto square = corners.measure(grey, level, options.segmentation_row_step, segmentation.image,
@@ -116,7 +136,6 @@ bool SquaresDetector::Work::measure_candidate(const cv::Mat& grey, uint8_t level
   const auto first = found ? first_feature(interior) : std::nullopt;
   stopwatch.lap("labelling");
   if (!first) return false;
-  detection.correspondences.clear();
   int feature = *first;
   for (const auto& square : labelled) {
     for (const auto& corner : square.corners) {
@@ -142,17 +161,12 @@ const Detection& SquaresDetector::detect(const cv::Mat& grey, const std::optiona
   w.detection.threshold = level;
   stopwatch.lap("histogram");
   segment(grey, level, w.options.segmentation_row_step, w.options.min_component_px, w.segmentation);
+  w.find_candidates();
   stopwatch.lap("segmentation");
-
-  const Segmentation& s = w.segmentation;
-  int64_t largest = 0;  // box of the best candidate yet
-  for (int label = 1; label < static_cast<int>(s.components.list.size()); ++label) {
-    if (!w.may_be_target(label)) continue;
-    const Component& c = s.at(label);
-    const int64_t size = int64_t{c.right - c.left + 1} * (c.bottom - c.top + 1);
-    if (size <= largest || !w.measure_candidate(grey, level, label, stopwatch)) continue;
-    largest = size;
+  for (const int interior : w.candidates) {
+    if (!w.measure_candidate(grey, level, interior, stopwatch)) continue;
     w.detection.status = DetectionStatus::kFound;
+    break;
   }
   return w.detection;
 }
