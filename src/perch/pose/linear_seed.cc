@@ -33,8 +33,8 @@ struct Conditioner {
 
 }  // namespace
 
-std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane,
-                                  std::span<const Eigen::Vector2d> image) {
+std::optional<PlaneView> plane_view(std::span<const Eigen::Vector2d> plane,
+                                    std::span<const Eigen::Vector2d> image) {
   if (plane.size() != image.size() || plane.size() < 4) return std::nullopt;
   const Conditioner on_plane(plane), in_image(image);
   if (!on_plane.spread || !in_image.spread) return std::nullopt;
@@ -62,17 +62,26 @@ std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane,
   const Eigen::Vector3d h3 = eigen.eigenvectors().col(0);
   Eigen::Matrix3d H;
   H << (solved_x * h3).transpose(), (solved_y * h3).transpose(), h3.transpose();
-  // Back to the units of both sides, but still about the centroid of the points: that, unlike the target's
-  // origin, is surely in front of the camera. A board of tags may lie to one side of its origin.
+  // Back to the units of both sides.
   H.leftCols<2>() *= on_plane.scale;
   H.topRows<2>() /= in_image.scale;
   H.topRows<2>() += in_image.centre * H.row(2);
-  auto camera_from_target = pose_from_homography(H);
+  return PlaneView{H, on_plane.centre};
+}
+
+std::optional<Rigid3> linear_seed(const PlaneView& view) {
+  auto camera_from_target = pose_from_homography(view.H);
   if (camera_from_target) {
-    const Eigen::Vector3d centre(on_plane.centre.x(), on_plane.centre.y(), 0);
+    const Eigen::Vector3d centre(view.centre.x(), view.centre.y(), 0);
     camera_from_target->translation -= camera_from_target->rotation * centre;
   }
   return camera_from_target;
+}
+
+std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane,
+                                  std::span<const Eigen::Vector2d> image) {
+  const auto view = plane_view(plane, image);
+  return view ? linear_seed(*view) : std::nullopt;
 }
 
 std::optional<Rigid3> pose_from_homography(const Eigen::Matrix3d& homography) {

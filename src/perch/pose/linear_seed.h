@@ -8,6 +8,13 @@
 
 namespace perch {
 
+// How a plane is seen: x ~ H (q - centre, 1), with the centroid of the points for the centre. That, unlike
+// the target's origin, is surely in front of the camera: a board of tags may lie to one side of its origin.
+struct PlaneView {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Identity();
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+};
+
 // The paper's section 2.2.2: camera_from_target from points of the target's plane q = (q1, q2, 0) and their
 // image points x = (x1, x2, 1) of an ideal camera (pixels undistorted and divided by depth).
 //
@@ -20,6 +27,12 @@ namespace perch {
 // seen from behind.
 std::optional<Rigid3> linear_seed(std::span<const Eigen::Vector2d> plane,
                                   std::span<const Eigen::Vector2d> image);
+
+// Its two halves: the null vector of F,
+std::optional<PlaneView> plane_view(std::span<const Eigen::Vector2d> plane,
+                                    std::span<const Eigen::Vector2d> image);
+// and R and p from it.
+std::optional<Rigid3> linear_seed(const PlaneView& view);
 
 // R and p from H ~ [r1 r2 p], the second half of the same section.
 std::optional<Rigid3> pose_from_homography(const Eigen::Matrix3d& H);

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <array>
+#include <optional>
+
 #include "perch/geometry/rigid3.h"
+#include "perch/pose/linear_seed.h"
 
 namespace perch {
 
@@ -10,5 +14,12 @@ namespace perch {
 // along v. Returns that mirrored pose, from which the refinement finds the second minimum. At v = r3 (seen
 // straight on) the two are one.
 Rigid3 mirrored_pose(const Rigid3& camera_from_target);
+
+// The two poses whose picture agrees with a view's to first order about its centre (Collins and Bartoli,
+// Infinitesimal plane-based pose estimation, 2014). They are each other's mirror image. From far away the
+// perspective that the linear seed takes the tilt from drowns in the noise, and it finds tilts of 70 degrees
+// where there are 10, from where a descent runs into the flat saddle between the two minima; the first order
+// is what remains of the picture. Empty for a mirrored view or one seen edge-on.
+std::optional<std::array<Rigid3, 2>> infinitesimal_poses(const PlaneView& view);
 
 }  // namespace perch

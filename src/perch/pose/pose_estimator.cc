@@ -1,8 +1,10 @@
 #include "perch/pose/pose_estimator.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "perch/geometry/euler.h"
 #include "perch/pose/linear_seed.h"
@@ -15,11 +17,41 @@ namespace {
 // four corners leave two residuals to spare, whose mean square alone would be worthless.
 constexpr double kPriorFreedom = 8;
 
-// Minima whose rotations are closer than this are one: the refinement stops a thousand times nearer.
-constexpr double kSameMinimum = 1e-4;  // rad
+// A descent ends when the sum of squared sigmas falls by less: that moves no pose by more than a thousandth
+// of its own deviation.
+constexpr double kDone = 1e-6;
+// In the neighbourhood of a minimum: from there Huber's loss takes over from least squares.
+constexpr double kNear = 1;
+
+// Minima whose rotations are closer than this are one. In the flat valley of a face seen from far and
+// straight on a descent ends up to 6 % of a deviation (the fourth root of kDone) before the bottom.
+constexpr double kSameMinimum = 0.01;  // rad
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Eigen::Vector3d normal_of(const Rigid3& camera_from_target) {
+  return camera_from_target.rotation * Eigen::Vector3d::UnitZ();
+}
 
 bool faces_camera(const Rigid3& camera_from_target) {
-  return (camera_from_target.rotation * Eigen::Vector3d::UnitZ()).dot(camera_from_target.translation) < 0;
+  return normal_of(camera_from_target).dot(camera_from_target.translation) < 0;
+}
+
+// A hint that is none counts for nothing.
+bool is_usable(const NormalHint& hint) {
+  return hint.normal_in_camera.allFinite() && hint.normal_in_camera.norm() > 0 && std::isfinite(hint.sigma) &&
+         hint.sigma > 0;
+}
+
+// The angle between a pose's normal and the hint's, squared, over the variance of both along it.
+double chi_square(const UncertainRigid3& camera_from_target, const NormalHint& hint) {
+  const Eigen::Vector3d normal = normal_of(camera_from_target.mean);
+  const Eigen::Vector3d cross = normal.cross(hint.normal_in_camera);
+  const double angle = std::atan2(cross.norm(), normal.dot(hint.normal_in_camera));
+  // Normals that agree, or are opposite, have no one axis.
+  const Eigen::Vector3d axis = cross.norm() > 0 ? cross.normalized() : normal.unitOrthogonal();
+  const double own = axis.dot(camera_from_target.covariance.bottomRightCorner<3, 3>() * axis);
+  return angle * angle / (hint.sigma * hint.sigma + own);
 }
 
 }  // namespace
@@ -38,51 +70,103 @@ PoseOptions read_pose_options(Section pose) {
 
 PoseEstimator::PoseEstimator(const LandingTarget& target, const CameraModel& camera,
                              const PoseOptions& options)
-    : camera_(camera), options_(options) {
+    : camera_(camera), options_(options), errors_(camera) {
   for (const auto& feature : target.features) features_.push_back(feature.point);
   solver_.options.max_num_iterations = options.max_iterations;
-  // Of the whole cost: 1e-9 of a squared sigma moves no pose by a thousandth of its own deviation.
-  solver_.options.function_tolerance = 1e-9;
   solver_.options.gradient_tolerance = 1e-9;
 }
 
-PoseEstimator::Minimum PoseEstimator::refine(const Rigid3& start) {
-  const ReprojectionCost cost(camera_, observations_, start, options_.huber_sigmas);
+// The linear seed is the best from near, the infinitesimal poses from far: which one, the pixels tell.
+std::optional<Rigid3> PoseEstimator::best_seed() {
+  const auto view = plane_view(plane_, image_);
+  if (!view) return std::nullopt;
+  std::optional<Rigid3> best;
+  double lowest = kInfinity;
+  const auto consider = [&](const Rigid3& seed) {
+    LossSum sum;
+    const ReprojectionCost cost(errors_, seed, kInfinity);
+    if (!cost.sum(PoseVector::Zero(), false, &sum) || !(sum.value < lowest)) return;
+    best = seed;
+    lowest = sum.value;
+  };
+  if (const auto seed = linear_seed(*view)) consider(*seed);
+  if (const auto pair = infinitesimal_poses(*view)) std::ranges::for_each(*pair, consider);
+  return best;
+}
+
+// By least squares (`huber` infinite) to the neighbourhood of a minimum: far from one all errors are beyond
+// Huber's bound, and his loss takes four times the steps. Then by his loss to its bottom.
+std::optional<PoseEstimator::Descent> PoseEstimator::descend(const Rigid3& start, double huber,
+                                                             double tolerance) {
+  const ReprojectionCost cost(errors_, start, huber);
+  solver_.options.function_tolerance = tolerance;
   PoseVector x = PoseVector::Zero();
-  Minimum minimum;
-  // The solver does not ask whether its first evaluation succeeded.
-  for (const auto& o : observations_) {
-    if (!camera_.pixel_from_camera(start * o.p_target)) return minimum;
-  }
   const auto& summary = solver_.Solve(cost, &x);
-  minimum.camera_from_target = cost.pose(x);
-  minimum.camera_from_target.rotation.normalize();
-  minimum.cost = 2 * summary.final_cost;
-  minimum.converged =
-      std::isfinite(minimum.cost) && x.allFinite() && summary.status != decltype(solver_)::HIT_MAX_ITERATIONS;
+  // The solver does not say that it could not evaluate the start; but then it has never set the gradient.
+  if (summary.gradient_max_norm < 0 || !x.allFinite()) return std::nullopt;
+  return Descent{cost.pose(x), summary.status != decltype(solver_)::HIT_MAX_ITERATIONS};
+}
+
+// The covariance is Huber's for his own estimate (Robust Statistics, 1981, 7.6): the mean of psi^2 over the
+// square of the mean of psi', times (J'J)^-1. In two dimensions psi' is 1 along and across an error within
+// the bound, beyond it 0 along and bound / distance across.
+std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const Rigid3& camera_from_target) {
+  Minimum minimum;
+  minimum.camera_from_target.mean = camera_from_target;
+  PoseCovariance information = PoseCovariance::Zero();
+  double squares_px = 0, squares = 0, pull = 0, bend = 0;
+  const auto errors = errors_.at(camera_from_target);
+  if (errors.empty()) return std::nullopt;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    const auto& [error, J] = errors[i];
+    const double distance = error.norm(), bound = options_.huber_sigmas;
+    squares += distance * distance;
+    squares_px += std::pow(observations_[i].sigma_px * distance, 2);
+    minimum.cost += huber_loss(distance, bound);
+    pull += std::pow(std::min(distance, bound), 2);
+    bend += distance <= bound ? 1 : 0.5 * bound / distance;
+    information.noalias() += J.transpose() * J;
+  }
+  const auto n = static_cast<double>(observations_.size());
+  const double freedom = std::max(0.0, 2 * n - 6);
+  minimum.rms_px = std::sqrt(squares_px / n);
+  minimum.rms_sigmas = std::sqrt(squares / n);
+  minimum.variance = (kPriorFreedom + pull) / (kPriorFreedom + freedom);
+  minimum.bend = bend / n;
+  const Eigen::LDLT<PoseCovariance> ldlt(information);
+  auto& covariance = minimum.camera_from_target.covariance;
+  covariance = minimum.variance / (minimum.bend * minimum.bend) * ldlt.solve(PoseCovariance::Identity());
+  if (!ldlt.isPositive() || !covariance.allFinite() || !std::isfinite(minimum.cost)) return std::nullopt;
   return minimum;
 }
 
-double PoseEstimator::noise_variance(double cost) const {
-  const double freedom = std::max(0.0, 2.0 * static_cast<double>(observations_.size()) - 6);
-  return (kPriorFreedom + cost) / (kPriorFreedom + freedom);
+// The descent starts by least squares: far from a minimum all errors are beyond Huber's bound, and his loss
+// takes four times the steps. A pose that fits so badly that it would be refused for itself is in no
+// question, however far from the bottom of Huber's loss it may be.
+std::optional<PoseEstimator::Minimum> PoseEstimator::second_minimum(const Minimum& best) {
+  const Rigid3& first = best.camera_from_target.mean;
+  const auto differs = [&](const std::optional<Descent>& descent) {
+    return descent && faces_camera(descent->camera_from_target) &&
+           descent->camera_from_target.rotation.angularDistance(first.rotation) > kSameMinimum;
+  };
+  // A descent that has not come to its end is still a pose with its cost: it counts.
+  const auto near = descend(mirrored_pose(first), kInfinity, kNear);
+  if (!differs(near)) return other_end_of_valley(best);
+  const auto rough = minimum_at(near->camera_from_target);
+  if (!rough || !(rough->rms_sigmas <= options_.max_rms_sigmas)) return rough;
+  const auto bottom = descend(near->camera_from_target, options_.huber_sigmas, kDone);
+  return differs(bottom) ? minimum_at(bottom->camera_from_target) : other_end_of_valley(best);
 }
 
-UncertainRigid3 PoseEstimator::with_covariance(const Minimum& minimum) const {
-  PoseCovariance information = PoseCovariance::Zero();
-  for (const auto& observation : observations_) {
-    Eigen::Vector2d error;
-    PixelJacobian J;
-    if (!whitened_error(camera_, minimum.camera_from_target, observation, &error, &J)) continue;
-    // A corner beyond Huber's bound holds the pose as weakly as it pulls.
-    const double distance = error.norm();
-    const double weight = distance > options_.huber_sigmas ? options_.huber_sigmas / distance : 1;
-    information.noalias() += weight * J.transpose() * J;
-  }
-  const Eigen::LDLT<PoseCovariance> ldlt(information);
-  UncertainRigid3 result{minimum.camera_from_target, PoseCovariance::Zero()};
-  result.covariance = noise_variance(minimum.cost) * ldlt.solve(PoseCovariance::Identity());
-  return result;
+// Between one minimum and two lies a bent valley with one bottom, in which the mirror image may fit almost as
+// well. Where the covariance, which knows of no bends, calls it impossible, it is in question too.
+std::optional<PoseEstimator::Minimum> PoseEstimator::other_end_of_valley(const Minimum& best) {
+  const auto& [mean, covariance] = best.camera_from_target;
+  const Rigid3 mirrored = mirrored_pose(mean);
+  const Eigen::Vector3d turn = pose_error(mean, mirrored).tail<3>();
+  const Eigen::Matrix3d of_turn = covariance.bottomRightCorner<3, 3>();
+  if (!(turn.dot(of_turn.ldlt().solve(turn)) > options_.min_evidence)) return std::nullopt;
+  return minimum_at(mirrored);
 }
 
 void PoseEstimator::observe(std::span<const Correspondence> correspondences) {
@@ -90,6 +174,9 @@ void PoseEstimator::observe(std::span<const Correspondence> correspondences) {
   plane_.clear();
   image_.clear();
   for (const auto& c : correspondences) {
+    // No measurement: nothing of it may reach the solver.
+    if (c.feature < 0 || static_cast<size_t>(c.feature) >= features_.size()) continue;
+    if (!std::isfinite(c.sigma_px) || !(c.sigma_px > 0)) continue;
     const Eigen::Vector2d& point = features_[static_cast<size_t>(c.feature)];
     const auto ray = camera_.ray_from_pixel(c.pixel);
     if (!ray || !(ray->z() > 0)) continue;  // outside the part of the picture the lens model covers
@@ -97,31 +184,7 @@ void PoseEstimator::observe(std::span<const Correspondence> correspondences) {
     plane_.push_back(point);
     image_.push_back(ray->hnormalized());
   }
-}
-
-PoseEstimator::Residuals PoseEstimator::residuals_at(const Rigid3& camera_from_target) const {
-  double squares_px = 0;
-  double squares = 0;
-  for (const auto& o : observations_) {
-    Eigen::Vector2d error = Eigen::Vector2d::Zero();
-    whitened_error(camera_, camera_from_target, o, &error, nullptr);
-    squares += error.squaredNorm();
-    squares_px += (o.sigma_px * error).squaredNorm();
-  }
-  const double n = static_cast<double>(observations_.size());
-  return {std::sqrt(squares_px / n), std::sqrt(squares / n)};
-}
-
-double PoseEstimator::chi_square(const Minimum& minimum, double noise,
-                                 std::span<const NormalHint> hints) const {
-  double sum = minimum.cost / noise;
-  const Eigen::Vector3d normal = minimum.camera_from_target.rotation * Eigen::Vector3d::UnitZ();
-  for (const auto& hint : hints) {
-    const double angle =
-        std::atan2(normal.cross(hint.normal_in_camera).norm(), normal.dot(hint.normal_in_camera));
-    sum += angle * angle / (hint.sigma * hint.sigma);
-  }
-  return sum;
+  errors_.observe(observations_);
 }
 
 PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondences,
@@ -133,37 +196,40 @@ PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondenc
     result.status = PoseStatus::kPartial;
     return result;
   }
-  const auto seed = linear_seed(plane_, image_);
+  const auto seed = best_seed();
   if (!seed) return result;
-  Minimum best = refine(*seed);
-  if (!best.converged) return result;
-  Minimum second = refine(mirrored_pose(best.camera_from_target));
-  const double apart = second.camera_from_target.rotation.angularDistance(best.camera_from_target.rotation);
-  const bool two = second.converged && apart > kSameMinimum && faces_camera(second.camera_from_target);
-  const double noise = noise_variance(two ? std::min(best.cost, second.cost) : best.cost);
-  double evidence = std::numeric_limits<double>::infinity();
-  if (two) {
-    result.ambiguity = std::min(best.cost, second.cost) / std::max(best.cost, second.cost);
-    evidence = chi_square(second, noise, hints) - chi_square(best, noise, hints);
-    if (evidence < 0) std::swap(best, second);
-    evidence = std::abs(evidence);
-    result.second = with_covariance(second);
-  }
-
-  const Residuals residuals = residuals_at(best.camera_from_target);
-  result.reprojection_rms_px = residuals.rms_px;
+  const auto near = descend(*seed, kInfinity, kNear);
+  if (!near) return result;
+  const auto descent = descend(near->camera_from_target, options_.huber_sigmas, kDone);
+  if (!descent || !descent->converged) return result;
+  std::optional<Minimum> best = minimum_at(descent->camera_from_target);
+  if (!best) return result;
+  std::optional<Minimum> second = second_minimum(*best);
+  if (second && second->cost < best->cost) std::swap(best, second);
+  result.reprojection_rms_px = best->rms_px;
+  if (second) result.ambiguity = second->cost > 0 ? best->cost / second->cost : 1;
   // Not "greater than": a NaN is refused too.
-  if (!(residuals.rms_sigmas <= options_.max_rms_sigmas)) return result;
-  result.camera_from_target = with_covariance(best);
-  const bool decided = evidence >= options_.min_evidence;
-  if (two) {
-    // The covariance of the two as a mixture about the better one.
-    const PoseError step = pose_error(best.camera_from_target, second.camera_from_target);
-    result.camera_from_target.covariance += step * step.transpose() / (1 + std::exp(evidence / 2));
+  const auto fits = [&](const Minimum& m) { return m.rms_sigmas <= options_.max_rms_sigmas; };
+  if (!fits(*best)) return result;
+  result.status = PoseStatus::kOk;
+  result.camera_from_target = best->camera_from_target;
+  if (!second || !fits(*second)) return result;  // no alternative, whatever a hint may say
+
+  double evidence = (second->cost - best->cost) * best->bend / best->variance;
+  for (const auto& hint : hints) {
+    if (!is_usable(hint)) continue;
+    evidence += chi_square(second->camera_from_target, hint) - chi_square(best->camera_from_target, hint);
   }
-  if (!result.camera_from_target.covariance.allFinite()) return result;
-  const bool harmless = apart < options_.same_minimum_deg * kRadFromDeg;
-  result.status = decided || harmless ? PoseStatus::kOk : PoseStatus::kAmbiguous;
+  if (evidence < 0) std::swap(best, second);
+  result.reprojection_rms_px = best->rms_px;
+  result.camera_from_target = best->camera_from_target;
+  result.second = second->camera_from_target;
+  // The covariance of the two as a mixture about the better one.
+  const PoseError step = pose_error(best->camera_from_target.mean, second->camera_from_target.mean);
+  result.camera_from_target.covariance += step * step.transpose() / (1 + std::exp(std::abs(evidence) / 2));
+  const bool decided = std::abs(evidence) >= options_.min_evidence;
+  const bool harmless = step.tail<3>().norm() < options_.same_minimum_deg * kRadFromDeg;
+  if (!decided && !harmless) result.status = PoseStatus::kAmbiguous;
   return result;
 }
 

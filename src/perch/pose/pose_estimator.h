@@ -1,7 +1,5 @@
 #pragma once
 
-#include <ceres/tiny_solver.h>
-
 #include <optional>
 #include <span>
 #include <vector>
@@ -32,7 +30,7 @@ struct PoseOptions {
   double gravity_sigma_deg = 3;
   // Minima closer than this are not worth a word: the covariance takes both in.
   double same_minimum_deg = 5;
-  int max_iterations = 30;  // five is normal
+  int max_iterations = 50;  // five are normal; in the flat valley of a face seen straight on, 30
 };
 
 // Reads the section and refuses unknown keys.
@@ -46,10 +44,12 @@ struct NormalHint {
 
 struct PoseResult {
   PoseStatus status = PoseStatus::kRejected;
-  UncertainRigid3 camera_from_target;     // meaningful with kOk, kAmbiguous
-  std::optional<UncertainRigid3> second;  // the other minimum of the planar problem
-  double reprojection_rms_px = 0;         // root of the mean squared distance over the features
-  double ambiguity = 0;  // cost of the best pose over that of the second: 0 sure, 1 undecidable
+  UncertainRigid3 camera_from_target;  // meaningful with kOk, kAmbiguous
+  // The other pose of the planar problem, where it is in question: the second minimum, or the mirror image of
+  // the first when that is no minimum but fits as well.
+  std::optional<UncertainRigid3> second;
+  double reprojection_rms_px = 0;  // root of the mean squared distance over the features
+  double ambiguity = 0;            // cost of the best pose over that of the second: 0 sure, 1 undecidable
   int features = 0;
 };
 
@@ -64,27 +64,32 @@ class PoseEstimator {
                       std::span<const NormalHint> hints = {});
 
  private:
-  struct Minimum {
+  struct Descent {
     Rigid3 camera_from_target;
-    double cost = 0;  // sum of the squared whitened errors, with the loss
     bool converged = false;
   };
-  struct Residuals {
+  // A pose with what its residuals tell. Huber's loss is rho(d) of a whitened distance d, psi half its slope.
+  struct Minimum {
+    UncertainRigid3 camera_from_target;
+    double cost = 0;                    // sum of rho
     double rms_px = 0, rms_sigmas = 0;  // root mean squared distance
+    double variance = 1;                // of the noise in stated ones: psi^2 a degree of freedom
+    double bend = 1;                    // mean of psi', 1 when no error is beyond the bound
   };
   void observe(std::span<const Correspondence> correspondences);
-  Residuals residuals_at(const Rigid3& camera_from_target) const;
-  Minimum refine(const Rigid3& start);
-  UncertainRigid3 with_covariance(const Minimum& minimum) const;
-  double chi_square(const Minimum& minimum, double noise, std::span<const NormalHint> hints) const;
-  double noise_variance(double cost) const;
+  std::optional<Rigid3> best_seed();
+  std::optional<Descent> descend(const Rigid3& start, double huber, double tolerance);
+  std::optional<Minimum> minimum_at(const Rigid3& camera_from_target);
+  std::optional<Minimum> second_minimum(const Minimum& best);
+  std::optional<Minimum> other_end_of_valley(const Minimum& best);
 
   std::vector<Eigen::Vector2d> features_;
   CameraModel camera_;
   PoseOptions options_;
   std::vector<Observation> observations_;
   std::vector<Eigen::Vector2d> plane_, image_;
-  ceres::TinySolver<ReprojectionCost> solver_;
+  ReprojectionErrors errors_;
+  PoseSolver solver_;  // keeps nothing from one descent to the next
 };
 
 }  // namespace perch
