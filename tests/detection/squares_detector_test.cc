@@ -172,9 +172,8 @@ TEST_F(Detecting, SeesPastARegionThatOnlyCountsLikeATarget) {
   EXPECT_LE(worst_corner_px(detect(grey), target, camera, pose), kCornerPx);
 }
 
-TEST_F(Detecting, MeasuresSlantingSquaresAndNotTheirNeighbours) {
-  // Seen along its diagonal from low, a square fills a small part of its box, its neighbours and the border
-  // more.
+TEST_F(Detecting, MeasuresSlantingSquares) {
+  // Seen from low, also along its diagonal, where a square's box is mostly its neighbours'.
   int found = 0;
   for (int degrees = 0; degrees < 360; degrees += 5) {
     const Rigid3 pose = looking_pose(1.6, 70 * kRadFromDeg, degrees * kRadFromDeg, 0);
@@ -280,13 +279,38 @@ TEST_F(DetectingNested, MeasuresTheInnerSquaresWhereTheOuterOnesAreNotAllThere) 
 }
 
 TEST_F(DetectingNested, DoesNotTakeTheInnerTargetForTheOuterWhenItsRingIsBroken) {
-  for (const double distance : {0.9, 0.7, 0.5, 0.4, 0.3}) {
-    const Rigid3 pose = looking_pose(distance, 0.1, 1, 0, {-0.125, 0.125});
-    cv::Mat grey = picture_of(target, camera, pose);
-    paint_line(grey, camera, pose, {0.22, 0.125}, {0.3, 0.125}, 20, 7);  // a shadow from the hole outwards
-    const Detection& found = detector.detect(grey, {});
-    if (found.status != DetectionStatus::kFound) continue;
-    EXPECT_LE(worst_corner_px(found, target, camera, pose), kCornerPx) << distance;
+  for (const double distance : {2.0, 1.8, 1.3, 1.1, 0.9, 0.7, 0.5, 0.4, 0.3}) {
+    // In the picture's middle, and so far aside that the outer target's interior leaves the picture.
+    for (const double aside : {0.0, 0.35}) {
+      const Rigid3 pose = looking_pose(distance, 0.1, 1, 0, {aside * distance - 0.125, 0.125});
+      cv::Mat grey = picture_of(target, camera, pose);
+      paint_line(grey, camera, pose, {0.04, 0.125}, {-0.02, 0.125}, 20,
+                 5);  // a shadow from the hole outwards
+      const Detection& found = detector.detect(grey, {});
+      if (found.status != DetectionStatus::kFound) continue;
+      EXPECT_LE(worst_corner_px(found, target, camera, pose), kSlantedCornerPx) << distance << ", " << aside;
+    }
+  }
+}
+
+TEST_F(DetectingNested, TellsADarkMatOnAPaleFloorFromTheHole) {
+  // The mat as large as the hole would be, larger, and on a white sheet that is no ring.
+  for (const double mat : {1.23, 1.5}) {
+    for (const double sheet : {0.0, 2.6}) {
+      for (const double distance : {9.0, 7.5, 6.0, 4.0, 3.0}) {
+        const Rigid3 pose = looking_pose(distance, 0.2, 1, 0.5);
+        LandingTarget laid_out = target;
+        const auto patch = [&](double side, bool white) {
+          return Patch{square_corners(Eigen::Vector2d::Constant(-side / 2), side), white};
+        };
+        laid_out.patches.insert(laid_out.patches.begin(), patch(mat, false));
+        if (sheet > 0) laid_out.patches.insert(laid_out.patches.begin(), patch(sheet, true));
+        Drawing drawing;
+        drawing.ground = sheet > 0 ? 40 : 190;
+        const Detection& found = detector.detect(picture_of(laid_out, camera, pose, drawing), {});
+        EXPECT_LE(worst_corner_px(found, target, camera, pose), kCornerPx) << mat << ", " << distance;
+      }
+    }
   }
 }
 

@@ -46,6 +46,17 @@ bool is_near_edge(const Segmentation& s, const Component& border, double inner_i
          border.bottom > static_cast<double>(s.image.rows.size()) - 1 - down;
 }
 
+// Whether another white thing reaches around this border: the ring, though broken.
+bool is_enclosed(const Segmentation& s, int border) {
+  const Component& b = s.at(border);
+  for (int label = 1; label < static_cast<int>(s.components.list.size()); ++label) {
+    const Component& c = s.at(label);
+    if (label == border || s.is_noise(label) || !c.white) continue;
+    if (c.left <= b.left && c.right >= b.right && c.top <= b.top && c.bottom >= b.bottom) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 NestedPart nested_part(const Segmentation& s, const NestedCandidate& candidate, double hole_in_square,
@@ -57,14 +68,14 @@ NestedPart nested_part(const Segmentation& s, const NestedCandidate& candidate, 
   const bool small = candidate.side_px < kHoleSeenFrom;
   const int hole = s.around(candidate.border);
   if (hole == Components::kFrame) {
-    return small && !is_near_edge(s, border, inner_in_hole) ? NestedPart::kOuter : NestedPart::kUnknown;
+    const bool alone = !is_near_edge(s, border, inner_in_hole) && !is_enclosed(s, candidate.border);
+    return small && alone ? NestedPart::kOuter : NestedPart::kUnknown;
   }
   // Something black around it that is not the ground: the hole, or a dark mat on a pale floor. The ring may
   // be cut, by no more than what it has beside the hole.
   const Component& ring = s.at(s.around(hole));
   const double in_ring = box_ratio(s.at(hole), ring);
-  if (ring.white && is_about(box_ratio(border, s.at(hole)), inner_in_hole) &&
-      in_ring > hole_in_square / kRatioSlack) {
+  if (is_about(box_ratio(border, s.at(hole)), inner_in_hole) && in_ring > hole_in_square / kRatioSlack) {
     return NestedPart::kInner;
   }
   const bool is_floor = in_ring < 0.5 * hole_in_square;

@@ -49,8 +49,7 @@ std::optional<SeenSquare> SquareCorners::measure(const cv::Mat& grey, uint8_t le
   const cv::Rect box = wanted & cv::Rect(0, 0, grey.cols, grey.rows);
   threshold_to_runs(grey(box), level, 1, window_);
   label_components(window_, components_);
-  // It is the component with the square's first pixel. (Not the largest: a slanting square's box may hold
-  // more of its neighbours than of itself.)
+  // It is the component with the square's first pixel; its box may hold parts of its neighbours too.
   const int column = sampled.runs[static_cast<size_t>(square.first_run)].begin;
   const int label = label_at(window_, column - box.x, square.top * row_step - box.y);
   const Component& whole = components_.list[static_cast<size_t>(label)];

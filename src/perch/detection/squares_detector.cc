@@ -73,13 +73,12 @@ SquaresDetector::SquaresDetector(const LandingTarget& target, const PaperOptions
 SquaresDetector::~SquaresDetector() = default;
 
 // Section 2.1.2: the region holds seven white components and one black one. Which one is what, the paper
-// leaves open; six of them lie in the black one, and that in the seventh.
+// leaves open; six of them lie in the black one, and that, as it is black, in the seventh.
 bool SquaresDetector::Work::may_be_target(int interior) {
   Segmentation& s = segmentation;
   const int n = static_cast<int>(layout.squares.size());
   if (s.holds[static_cast<size_t>(interior)] != n || s.is_noise(interior) || s.at(interior).white)
     return false;
-  if (!s.at(s.around(interior)).white) return false;
   // Of a nested target, the hole and the inner target are counted too, from near.
   if (layout.nested || !options.count_region) return true;
   const auto counts = counts_in_region_of(interior, s);
