@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <memory>
 
-#include "perch/analysis/overlay.h"
 #include "perch/analysis/output_files.h"
+#include "perch/analysis/overlay.h"
 #include "perch/estimator/estimator.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/flight.h"
@@ -23,7 +23,8 @@ constexpr size_t kFramesAhead = 16;
 CameraModel camera_of(const RunConfig& config, const Flight& flight) {
   if (!config.camera_model.empty()) return read_camera_model(config.camera_model);
   if (flight.camera) return *flight.camera;
-  throw std::runtime_error(flight.folder.string() + ": no camera model: expected camera.model in the configuration, " +
+  throw std::runtime_error(flight.folder.string() +
+                           ": no camera model: expected camera.model in the configuration, " +
                            "or mav0/cam0/camera.cameramodel or sensor.yaml in the flight" +
                            (flight.problems.empty() ? "" : "; " + flight.problems.front()));
 }
@@ -47,7 +48,8 @@ Estimator::Aid aid_at(const Flight& flight, const FrameChain& chain, int64_t cam
 }
 
 // Decodes in parallel and estimates in order: a frame's result may depend on those before it.
-void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator, FlightResult& result) {
+void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator,
+                     FlightResult& result) {
   using FramePtr = std::shared_ptr<Frame>;
   tbb::parallel_pipeline(
       kFramesAhead,
@@ -81,10 +83,10 @@ void write_outputs(const fs::path& folder, const FlightResult& result, const Fli
   write_flight_files(folder, score);
 }
 
-// Reads the pictures that the report shows once more: keeping all until they are chosen would take the memory of a
-// whole flight.
-std::vector<ReportPicture> draw_pictures(const BatchFlight& job, const FlightResult& result, const FlightScore& score,
-                                         const CameraModel& camera) {
+// Reads the pictures that the report shows once more: keeping all until they are chosen would take the memory
+// of a whole flight.
+std::vector<ReportPicture> draw_pictures(const BatchFlight& job, const FlightResult& result,
+                                         const FlightScore& score, const CameraModel& camera) {
   std::vector<ReportPicture> pictures;
   for (const ShownFrame& shown : frames_to_show(score)) pictures.push_back({shown, {}});
   const auto source = open_image_source("flight:" + job.folder.string(), job.config.channel);

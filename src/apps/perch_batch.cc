@@ -13,6 +13,7 @@
 #include <mutex>
 #include <thread>
 
+#include "batch_compare.h"
 #include "batch_flight.h"
 #include "perch/analysis/error_table.h"
 #include "perch/analysis/output_files.h"
@@ -63,7 +64,8 @@ std::vector<fs::path> flights_to_run(const CommandLine& line) {
     throw UsageError("--shard: expected k/n with 1 <= k <= n, found \"" + FLAGS_shard + '"');
   }
   std::vector<fs::path> mine;
-  for (size_t i = static_cast<size_t>(k) - 1; i < all.size(); i += static_cast<size_t>(n)) mine.push_back(all[i]);
+  for (size_t i = static_cast<size_t>(k) - 1; i < all.size(); i += static_cast<size_t>(n))
+    mine.push_back(all[i]);
   return mine;
 }
 
@@ -74,7 +76,8 @@ std::vector<fs::path> output_folders(const std::vector<fs::path>& flights) {
   for (const auto& flight : flights) {
     const std::string name = fs::absolute(flight / "").lexically_normal().parent_path().filename().string();
     if (const auto [it, is_new] = taken.emplace(name, flight); !is_new) {
-      throw UsageError(flight.string() + ": has the name of " + it->second.string() + ", which takes the same folder");
+      throw UsageError(flight.string() + ": has the name of " + it->second.string() +
+                       ", which takes the same folder");
     }
     folders.push_back(fs::path(FLAGS_output) / name);
   }
@@ -116,7 +119,8 @@ std::vector<Outcome> run_all(const RunConfig& config, const std::vector<fs::path
   tbb::parallel_for_each(indices, [&](size_t i) {
     if (stop_requested) return;
     try {
-      outcomes[i].flight = run_flight({config, flights[i], folders[i], stop_requested, [&] { progress.frame(); }});
+      outcomes[i].flight =
+          run_flight({config, flights[i], folders[i], stop_requested, [&] { progress.frame(); }});
       progress.flight(flights[i].string() + ": done");
     } catch (const Interrupted&) {
     } catch (const std::exception& e) {
@@ -136,6 +140,9 @@ int run(const CommandLine& line) {
     return 0;
   }
   if (FLAGS_output.empty()) throw UsageError("expected --output");
+  if (!FLAGS_compare.empty() && !fs::is_directory(FLAGS_compare)) {
+    throw UsageError("--compare " + FLAGS_compare + ": expected the output folder of an earlier run");
+  }
   if (FLAGS_jobs < 0) throw UsageError("--jobs: expected 0 or more, found " + std::to_string(FLAGS_jobs));
   try {
     make_detector(config.target, config.detection);
@@ -163,7 +170,9 @@ int run(const CommandLine& line) {
   }
   write_run_files(FLAGS_output, done, root.resolved());
   std::cout << "report: " << (fs::path(FLAGS_output) / "report.html").string() << '\n';
-  if (stop_requested) std::cerr << "perch-batch: interrupted: what is missing was not begun or not finished\n";
+  if (!FLAGS_compare.empty()) std::cout << '\n' << compare_runs(FLAGS_output, FLAGS_compare, folders);
+  if (stop_requested)
+    std::cerr << "perch-batch: interrupted: what is missing was not begun or not finished\n";
   return failed ? 1 : 0;
 }
 
@@ -171,10 +180,11 @@ int run(const CommandLine& line) {
 }  // namespace perch
 
 int main(int argc, char** argv) {
-  return perch::run_program(
-      argc, argv,
-      {"perch-batch", "--config C.yaml --output OUT FLIGHT... [flags]",
-       "Re-estimates recorded flights, frame by frame, scores the poses against the navigation source and writes\n"
-       "OUT/FLIGHT/{estimates,states,errors}.csv, pad_from_body.tum, summary.json, OUT/summary.csv, OUT/report.html."},
-      perch::run);
+  return perch::run_program(argc, argv,
+                            {"perch-batch", "--config C.yaml --output OUT FLIGHT... [flags]",
+                             "Re-estimates recorded flights, frame by frame, scores the poses against the "
+                             "navigation source and writes\n"
+                             "OUT/FLIGHT/{estimates,states,errors}.csv, pad_from_body.tum, summary.json, "
+                             "OUT/summary.csv, OUT/report.html."},
+                            perch::run);
 }

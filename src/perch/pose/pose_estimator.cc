@@ -27,6 +27,11 @@ constexpr double kNear = 1;
 // straight on a descent ends up to 6 % of a deviation (the fourth root of kDone) before the bottom.
 constexpr double kSameMinimum = 0.01;  // rad
 
+// A second minimum this near in the best one's own covariance (a chi-square; three sigma) is no other answer
+// but the same one, badly known, as soon as a hint has had its say: then the nearer of the two to the hint is
+// off by its noise.
+constexpr double kSameWithinNoise = 9;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Eigen::Vector3d normal_of(const Rigid3& camera_from_target) {
@@ -216,8 +221,10 @@ PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondenc
   if (!second || !fits(*second)) return result;  // no alternative, whatever a hint may say
 
   double evidence = (second->cost - best->cost) * best->bend / best->variance;
+  bool hinted = false;
   for (const auto& hint : hints) {
     if (!is_usable(hint)) continue;
+    hinted = true;
     evidence += chi_square(second->camera_from_target, hint) - chi_square(best->camera_from_target, hint);
   }
   if (evidence < 0) std::swap(best, second);
@@ -226,9 +233,12 @@ PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondenc
   result.second = second->camera_from_target;
   // The covariance of the two as a mixture about the better one.
   const PoseError step = pose_error(best->camera_from_target.mean, second->camera_from_target.mean);
+  const Eigen::Vector3d turn = step.tail<3>();
+  const Eigen::Matrix3d of_turn = best->camera_from_target.covariance.bottomRightCorner<3, 3>();
   result.camera_from_target.covariance += step * step.transpose() / (1 + std::exp(std::abs(evidence) / 2));
   const bool decided = std::abs(evidence) >= options_.min_evidence;
-  const bool harmless = step.tail<3>().norm() < options_.same_minimum_deg * kRadFromDeg;
+  const bool harmless = turn.norm() < options_.same_minimum_deg * kRadFromDeg ||
+                        (hinted && turn.dot(of_turn.ldlt().solve(turn)) < kSameWithinNoise);
   if (!decided && !harmless) result.status = PoseStatus::kAmbiguous;
   return result;
 }
