@@ -9,12 +9,14 @@
 #include "support/random_picture.h"
 #include "support/sharp_target.h"
 
-// Counts what is allocated by new. Not inlined: GCC would see new return what malloc gave and warn of a
-// delete that does not match.
 namespace {
 std::atomic<int> allocations{0};
 }
 
+// The address sanitizer has its own new, and wants each block back by the one that gave it.
+#ifndef __SANITIZE_ADDRESS__
+// Counts what is allocated by new. Not inlined: GCC would see new return what malloc gave and warn of a
+// delete that does not match.
 [[gnu::noinline]] void* operator new(size_t size) {
   ++allocations;
   if (void* memory = std::malloc(size)) return memory;
@@ -22,6 +24,7 @@ std::atomic<int> allocations{0};
 }
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, size_t) noexcept { std::free(memory); }
+#endif
 
 namespace perch {
 namespace {
@@ -149,7 +152,7 @@ TEST(SquaresRobustness, AllocatesNothingOnceItsBuffersHaveGrown) {
   };
   all();
   const int before = allocations;
-  EXPECT_GT(before, 0);  // the counter counts
+  if (before == 0) GTEST_SKIP() << "nothing is counted in this build";
   all();
   EXPECT_EQ(allocations - before, 0);
   EXPECT_GE(found, 20);
