@@ -22,7 +22,7 @@ class Estimating : public testing::Test {
   Estimator estimator() const { return Estimator(config, camera); }
 
   Frame frame_of(int number, const cv::Mat& grey) const {
-    return {number * kFrameNs, grey, "frame " + std::to_string(number), ""};
+    return {number * kFrameNs, grey, "frame " + std::to_string(number), {}, ""};
   }
   Frame seeing(int number, const Rigid3& camera_from_target) const {
     return frame_of(number, picture_of(config.target, camera, camera_from_target));
