@@ -44,7 +44,7 @@ std::string compare_runs(const fs::path& output, const fs::path& other, std::spa
       continue;
     }
     lines += "found " + pair_of(*ours, *theirs, "/detection/rate", 100, "%") + ", position RMS " +
-             pair_of(*ours, *theirs, "/position_m/rms", 100, "cm") + "\n";
+             pair_of(*ours, *theirs, "/errors/position_m/rms", 100, "cm") + "\n";
   }
   return lines;
 }
