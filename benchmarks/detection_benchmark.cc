@@ -5,24 +5,44 @@
 #include <map>
 
 #include "perch/detection/make_detector.h"
+#include "perch/simulation/random.h"
 #include "rows.h"
 #include "scene.h"
 
 namespace perch {
 namespace {
 
-void frame(benchmark::State& state, cv::Size size) {
+DetectionOptions by(DetectionMethod method) {
+  DetectionOptions options;
+  options.method = method;
+  return options;
+}
+
+// What a filter expects a frame after the last: 2 cm and a degree off.
+Prediction near(const Rigid3& truth, RandomStream& random) {
+  PoseCovariance covariance = PoseCovariance::Zero();
+  covariance.diagonal() << Eigen::Vector3d::Constant(4e-4), Eigen::Vector3d::Constant(3e-4);
+  PoseError error;
+  for (int i = 0; i < 6; ++i) error(i) = std::sqrt(covariance(i, i)) * random.normal();
+  return {{perturb(truth, error), covariance}};
+}
+
+void frame(benchmark::State& state, cv::Size size, const DetectionOptions& options, bool following) {
   const Scene& shared = scene(size);
-  const auto detector = make_detector(shared.squares, {});
+  const auto detector = make_detector(shared.squares, shared.camera, options);
   PoseEstimator estimator(shared.squares, shared.camera, {});
   std::vector<Shot> shots;
-  for (const View& view : shared.views) shots.push_back({view.squares, view.camera_from_target});
+  RandomStream random(7);
+  for (const View& view : shared.views) {
+    shots.push_back({view.squares, view.camera_from_target});
+    if (following) shots.back().prediction = near(view.camera_from_target, random);
+  }
   time_poses(state, shots, find_by(*detector, estimator));
 }
 
-void detection(benchmark::State& state, cv::Size size) {
+void detection(benchmark::State& state, cv::Size size, const DetectionOptions& options) {
   const Scene& shared = scene(size);
-  const auto detector = make_detector(shared.squares, {});
+  const auto detector = make_detector(shared.squares, shared.camera, options);
   std::map<std::string, double> stage_us;
   double pixels = 0, corners = 0, pictures = 0;
   while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(shared.views.size()))) {
@@ -45,19 +65,18 @@ void detection(benchmark::State& state, cv::Size size) {
   state.counters["rms_px"] = std::sqrt(pixels / corners);
 }
 
-void pose(benchmark::State& state, cv::Size size) {
+void pose(benchmark::State& state, cv::Size size, const DetectionOptions& options) {
   const Scene& shared = scene(size);
-  const auto detector = make_detector(shared.squares, {});
+  const auto detector = make_detector(shared.squares, shared.camera, options);
   PoseEstimator estimator(shared.squares, shared.camera, {});
-  std::vector<std::vector<Correspondence>> found;
+  std::vector<Detection> found;
   for (const View& view : shared.views) {
     const Detection& detection = detector->detect(view.squares, {});
-    if (detection.status == DetectionStatus::kFound) found.push_back(detection.correspondences);
+    if (detection.status == DetectionStatus::kFound) found.push_back(detection);
   }
   if (found.empty()) return state.SkipWithError("no target found");
   while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(found.size()))) {
-    for (const auto& correspondences : found)
-      benchmark::DoNotOptimize(estimator.estimate(correspondences, {}));
+    for (const Detection& detection : found) benchmark::DoNotOptimize(estimator.estimate(detection));
   }
 }
 
@@ -69,9 +88,17 @@ const bool kRegistered = [] {
         run(state, size);
       })->Unit(benchmark::kMicrosecond);
     };
-    add("perch_frame", frame);
-    add("perch_detection", detection);
-    add("perch_pose", pose);
+    for (const auto& [method, which] :
+         {std::pair(DetectionMethod::kPaper, "paper"), {DetectionMethod::kEdges, "edges"}}) {
+      const DetectionOptions options = by(method);
+      const std::string row = which;
+      add(row + "_frame", [=](auto& state, cv::Size s) { frame(state, s, options, false); });
+      if (method == DetectionMethod::kEdges) {
+        add(row + "_follow", [=](auto& state, cv::Size s) { frame(state, s, options, true); });
+      }
+      add(row + "_detection", [=](auto& state, cv::Size s) { detection(state, s, options); });
+      add(row + "_pose", [=](auto& state, cv::Size s) { pose(state, s, options); });
+    }
   }
   return true;
 }();

@@ -53,10 +53,10 @@ void aruco(benchmark::State& state, cv::Size size, bool aruco3) {
   const int id = std::get<AprilTagBoard>(shared.tag.layout).tags[0].id;
   const int threads = cv::getNumThreads();
   cv::setNumThreads(1);
-  time_poses(state, tag_shots(shared), [&](const cv::Mat& grey) -> std::optional<Rigid3> {
+  time_poses(state, tag_shots(shared), [&](const Shot& shot) -> std::optional<Rigid3> {
     std::vector<std::vector<cv::Point2f>> corners;
     std::vector<int> ids;
-    cv::aruco::detectMarkers(grey, dictionary, corners, ids, parameters);
+    cv::aruco::detectMarkers(shot.grey, dictionary, corners, ids, parameters);
     if (ids.size() != 1 || ids[0] != id) return {};
     return answer(estimator.estimate(correspondences(corners[0]), {}));
   });

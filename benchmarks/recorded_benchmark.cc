@@ -25,7 +25,7 @@ std::map<int64_t, Rigid3> read_truth(const std::filesystem::path& file) {
   return truth;
 }
 
-void recorded(benchmark::State& state, const std::filesystem::path& flight) {
+void recorded(benchmark::State& state, const std::filesystem::path& flight, DetectionMethod method) {
   const auto truth = read_truth(flight / "mav0/cam0/truth_target_pose.csv");
   const CameraModel camera = read_camera_model(flight / "mav0/cam0/sensor.yaml");
   const LandingTarget target =
@@ -37,7 +37,9 @@ void recorded(benchmark::State& state, const std::filesystem::path& flight) {
     if (!frame.grey.empty() && exact != truth.end()) shots.push_back({frame.grey.clone(), exact->second});
   }
   if (shots.empty()) return state.SkipWithError("no picture with a truth");
-  const auto detector = make_detector(target, {});
+  DetectionOptions options;
+  options.method = method;
+  const auto detector = make_detector(target, camera, options);
   PoseEstimator estimator(target, camera, {});
   time_poses(state, shots, find_by(*detector, estimator));
 }
@@ -46,9 +48,13 @@ const bool kRegistered = [] {
   for (const std::string name : {"dev_descent", "dev_hard"}) {
     const auto flight = shared_flight(name);
     if (flight.empty()) continue;
-    benchmark::RegisterBenchmark(("perch_frame/recorded/" + name).c_str(), [=](benchmark::State& state) {
-      recorded(state, flight);
-    })->Unit(benchmark::kMicrosecond);
+    for (const auto& [method, row] :
+         {std::pair(DetectionMethod::kPaper, "paper"), {DetectionMethod::kEdges, "edges"}}) {
+      benchmark::RegisterBenchmark(
+          (std::string(row) + "/recorded/" + name).c_str(),
+          [=, method = method](benchmark::State& state) { recorded(state, flight, method); })
+          ->Unit(benchmark::kMicrosecond);
+    }
   }
   return true;
 }();

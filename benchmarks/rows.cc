@@ -5,12 +5,12 @@ namespace perch {
 void time_poses(benchmark::State& state, std::span<const Shot> shots, const FindPose& find_pose) {
   // Every picture equally often: they differ in time as they do in error.
   while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(shots.size()))) {
-    for (const Shot& shot : shots) benchmark::DoNotOptimize(find_pose(shot.grey));
+    for (const Shot& shot : shots) benchmark::DoNotOptimize(find_pose(shot));
   }
   double mm = 0, mrad = 0;
   int found = 0;
   for (const Shot& shot : shots) {
-    const auto pose = find_pose(shot.grey);
+    const auto pose = find_pose(shot);
     if (!pose) continue;
     ++found;
     mm += 1e3 * (pose->translation - shot.camera_from_target.translation).norm();
@@ -27,10 +27,10 @@ std::optional<Rigid3> answer(const PoseResult& result) {
 }
 
 FindPose find_by(Detector& detector, PoseEstimator& estimator) {
-  return [&](const cv::Mat& grey) -> std::optional<Rigid3> {
-    const Detection& found = detector.detect(grey, {});
+  return [&](const Shot& shot) -> std::optional<Rigid3> {
+    const Detection& found = detector.detect(shot.grey, shot.prediction);
     if (found.status != DetectionStatus::kFound) return {};
-    return answer(estimator.estimate(found.correspondences, {}));
+    return answer(estimator.estimate(found));
   };
 }
 

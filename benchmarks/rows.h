@@ -19,10 +19,11 @@ namespace perch {
 struct Shot {
   cv::Mat grey;
   Rigid3 camera_from_target;
+  std::optional<Prediction> prediction = {};  // where a detector that follows expects the target
 };
 
 // From a picture to camera_from_target, empty when it finds none. What is timed.
-using FindPose = std::function<std::optional<Rigid3>(const cv::Mat&)>;
+using FindPose = std::function<std::optional<Rigid3>(const Shot&)>;
 
 // One row: the mean time a picture, and beside it how good the answers are: err_mm and err_mrad, means over
 // the pictures in which the target was found, and the fraction found. A fast wrong answer shows.

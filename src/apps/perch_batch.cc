@@ -145,7 +145,8 @@ int run(const CommandLine& line) {
   }
   if (FLAGS_jobs < 0) throw UsageError("--jobs: expected 0 or more, found " + std::to_string(FLAGS_jobs));
   try {
-    make_detector(config.target, config.detection);
+    // Whether the method serves the target; the camera is each flight's own.
+    make_detector(config.target, CameraModel::pinhole(500, 500, 320, 240, 641, 481), config.detection);
   } catch (const std::invalid_argument& e) {
     throw ConfigError(FLAGS_config + ": " + e.what());
   }

@@ -304,7 +304,7 @@ TEST(AprilTagDetector, FindsTheFeaturesOfARenderedTargetFile) {
                                        ", tags: [{id: 3, size: 0.6, center: [-0.3, 0.1], yaw: 0.4}, {id: 11, "
                                        "size: 0.3, center: [0.4, -0.1]}]}",
                                    "board.yaml"));
-    const auto detector = make_detector(target, {});
+    const auto detector = make_detector(target, CameraModel::pinhole(500, 500, 320, 240, 641, 481), {});
     const CameraModel camera = CameraModel::pinhole(600, 610, 330, 230, 640, 480);
     const Rigid3 camera_from_target{Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.6, -0.8, 0)) *
                                         Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()) *

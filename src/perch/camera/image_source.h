@@ -13,11 +13,11 @@ enum class Channel { kGrey, kRed, kGreen, kBlue };
 
 // One picture. An unreadable one is a frame too: it keeps its row in every output.
 struct Frame {
-  int64_t timestamp_ns = 0;  // mid-exposure, on the camera's clock
-  cv::Mat grey;              // CV_8UC1, continuous; empty when `problem` says why
-  std::string name;          // file, or file#number of a video
+  int64_t timestamp_ns = 0;    // mid-exposure, on the camera's clock
+  cv::Mat grey;                // CV_8UC1, continuous; empty when `problem` says why
+  std::string name;            // file, or file#number of a video
   std::filesystem::path file;  // between ImageSource::advance and ::read: what is to be read
-  std::string problem;       // "…/17.png: truncated", empty when all is well
+  std::string problem;         // "…/17.png: truncated", empty when all is well
 };
 
 // Pictures in their order. Not thread-safe.
@@ -30,8 +30,8 @@ class ImageSource {
     read(frame);
     return true;
   }
-  // The same in two steps, for those who decode in parallel: `advance` says which picture is next, `read` fills its
-  // pixels in. `advance` belongs to one thread; `read` may run in any, several at once.
+  // The same in two steps, for those who decode in parallel: `advance` says which picture is next, `read`
+  // fills its pixels in. `advance` belongs to one thread; `read` may run in any, several at once.
   virtual bool advance(Frame& frame) = 0;
   virtual void read(Frame& frame) const = 0;
   // How many there are; -1 when that cannot be known.

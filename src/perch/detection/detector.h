@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "perch/detection/plane_fit.h"
 #include "perch/geometry/uncertainty.h"
 
 namespace perch {
@@ -20,7 +21,20 @@ struct Correspondence {
   double sigma_px = 1;  // standard deviation of each coordinate
 };
 
-enum class DetectionStatus { kFound, kNoTarget, kPartial };
+// All measured edges of a frame at once: the homography that they fit best, and how well they know it. What
+// it loses of them is what is beyond second order in a step of a fraction of a pixel.
+struct PlaneMeasurement {
+  Eigen::Matrix3d image_from_plane = Eigen::Matrix3d::Identity();  // as in plane_fit.h
+  ImageFrame frame;
+  PlaneInformation information = PlaneInformation::Zero();  // of a PlaneStep about it
+  double rms_px = 0;                                        // of the edges' distances from it
+  double sigma_px = 1;                                      // of an edge, as the information has it
+  double growth_px = 0;                                     // of white on every side: blooming
+  int edges = 0;                                            // pieces of edges
+};
+
+// kAmbiguous: several targets in the picture, and nothing tells which is the pad.
+enum class DetectionStatus { kFound, kNoTarget, kPartial, kAmbiguous };
 
 // How long a step of the detector took.
 struct StageTime {
@@ -31,6 +45,7 @@ struct StageTime {
 struct Detection {
   DetectionStatus status = DetectionStatus::kNoTarget;
   std::vector<Correspondence> correspondences;  // empty unless found
+  std::optional<PlaneMeasurement> plane;        // with `edges`: what the correspondences are drawn from
   std::vector<StageTime> stages;
   int threshold = -1;  // grey level, where the method has one
 };

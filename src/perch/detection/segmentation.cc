@@ -23,9 +23,13 @@ void make_second_pass(Segmentation& s) {
 }  // namespace
 
 void segment(const cv::Mat& grey, uint8_t level, int row_step, int min_px, Segmentation& s) {
+  threshold_to_runs(grey, level, row_step, s.image);
+  segment_runs(min_px, s);
+}
+
+void segment_runs(int min_px, Segmentation& s) {
   s.min_px = min_px;
   s.second_pass = false;
-  threshold_to_runs(grey, level, row_step, s.image);
   label_components(s.image, s.components);
   s.holds.assign(s.components.list.size(), 0);
   for (int label = 1; label < static_cast<int>(s.components.list.size()); ++label) {

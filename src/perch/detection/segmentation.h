@@ -32,7 +32,10 @@ struct Segmentation {
   int around(int label) const { return surrounding(image, at(label)); }
 };
 
-// The first pass.
+// The first pass of `image`, which is there already.
+void segment_runs(int min_px, Segmentation& s);
+
+// The same of a picture's rows above a level.
 void segment(const cv::Mat& grey, uint8_t level, int row_step, int min_px, Segmentation& s);
 
 // How many components there are in the foreground region that this component is part of.

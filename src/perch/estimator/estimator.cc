@@ -22,6 +22,17 @@ EstimateStatus from_pose(PoseStatus status) {
   return EstimateStatus::kRejected;
 }
 
+EstimateStatus from_detection(DetectionStatus status) {
+  switch (status) {
+    case DetectionStatus::kPartial:
+      return EstimateStatus::kPartial;
+    case DetectionStatus::kAmbiguous:
+      return EstimateStatus::kAmbiguous;
+    default:
+      return EstimateStatus::kNoTarget;
+  }
+}
+
 // Why this frame cannot be estimated; empty when it can.
 std::string unreadable(const Frame& frame, const CameraModel& camera) {
   if (!frame.problem.empty()) return frame.problem;
@@ -69,7 +80,7 @@ Estimator::Estimator(const RunConfig& config, const CameraModel& camera)
     : camera_(camera),
       frames_(config.frames),
       gravity_sigma_(config.pose.gravity_sigma_deg * kRadFromDeg),
-      detector_(make_detector(config.target, config.detection)),
+      detector_(make_detector(config.target, camera, config.detection)),
       pose_(config.target, camera, config.pose),
       filter_(config.tracking) {}
 
@@ -95,8 +106,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
   estimate.correspondences = detection.correspondences;
   estimate.features = static_cast<int>(detection.correspondences.size());
   if (detection.status != DetectionStatus::kFound) {
-    estimate.status =
-        detection.status == DetectionStatus::kPartial ? EstimateStatus::kPartial : EstimateStatus::kNoTarget;
+    estimate.status = from_detection(detection.status);
     return;
   }
   stopwatch.restart();
@@ -106,7 +116,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
     const auto normal = level_normal_in_camera(frames_, *aid.world_from_body, aid.angles);
     if (normal) hints.push_back({*normal, gravity_sigma_});
   }
-  const PoseResult pose = pose_.estimate(detection.correspondences, hints);
+  const PoseResult pose = pose_.estimate(detection, hints);
   stopwatch.lap("pose");
   estimate.pose_us = estimate.stages.back().us;
   estimate.status = from_pose(pose.status);

@@ -64,6 +64,7 @@ double chi_square(const UncertainRigid3& camera_from_target, const NormalHint& h
 PoseOptions read_pose_options(Section pose) {
   PoseOptions o;
   pose.read("max_rms_sigmas", o.max_rms_sigmas, kPositive);
+  pose.read("max_misfit_px", o.max_misfit_px, kPositive);
   pose.read("huber_sigmas", o.huber_sigmas, kPositive);
   pose.read("min_evidence", o.min_evidence, kNotNegative);
   pose.read("gravity_sigma_deg", o.gravity_sigma_deg, kPositive);
@@ -145,6 +146,19 @@ std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const Rigid3& ca
   return minimum;
 }
 
+// Between one minimum and two lies a bent valley with one bottom, in which the mirror image may fit almost as
+// well. Where the covariance, which knows of no bends, calls it impossible, it is in question too.
+template <typename MinimumAt>
+std::optional<PoseEstimator::Minimum> PoseEstimator::other_end_of_valley(const Minimum& best,
+                                                                         const MinimumAt& at) const {
+  const auto& [mean, covariance] = best.camera_from_target;
+  const Rigid3 mirrored = mirrored_pose(mean);
+  const Eigen::Vector3d turn = pose_error(mean, mirrored).tail<3>();
+  const Eigen::Matrix3d of_turn = covariance.bottomRightCorner<3, 3>();
+  if (!(turn.dot(of_turn.ldlt().solve(turn)) > options_.min_evidence)) return std::nullopt;
+  return at(mirrored);
+}
+
 // The descent starts by least squares: far from a minimum all errors are beyond Huber's bound, and his loss
 // takes four times the steps. A pose that fits so badly that it would be refused for itself is in no
 // question, however far from the bottom of Huber's loss it may be.
@@ -154,24 +168,14 @@ std::optional<PoseEstimator::Minimum> PoseEstimator::second_minimum(const Minimu
     return descent && faces_camera(descent->camera_from_target) &&
            descent->camera_from_target.rotation.angularDistance(first.rotation) > kSameMinimum;
   };
+  const auto at_corners = [this](const Rigid3& pose) { return minimum_at(pose); };
   // A descent that has not come to its end is still a pose with its cost: it counts.
   const auto near = descend(mirrored_pose(first), kInfinity, kNear);
-  if (!differs(near)) return other_end_of_valley(best);
+  if (!differs(near)) return other_end_of_valley(best, at_corners);
   const auto rough = minimum_at(near->camera_from_target);
   if (!rough || !(rough->rms_sigmas <= options_.max_rms_sigmas)) return rough;
   const auto bottom = descend(near->camera_from_target, options_.huber_sigmas, kDone);
-  return differs(bottom) ? minimum_at(bottom->camera_from_target) : other_end_of_valley(best);
-}
-
-// Between one minimum and two lies a bent valley with one bottom, in which the mirror image may fit almost as
-// well. Where the covariance, which knows of no bends, calls it impossible, it is in question too.
-std::optional<PoseEstimator::Minimum> PoseEstimator::other_end_of_valley(const Minimum& best) {
-  const auto& [mean, covariance] = best.camera_from_target;
-  const Rigid3 mirrored = mirrored_pose(mean);
-  const Eigen::Vector3d turn = pose_error(mean, mirrored).tail<3>();
-  const Eigen::Matrix3d of_turn = covariance.bottomRightCorner<3, 3>();
-  if (!(turn.dot(of_turn.ldlt().solve(turn)) > options_.min_evidence)) return std::nullopt;
-  return minimum_at(mirrored);
+  return differs(bottom) ? minimum_at(bottom->camera_from_target) : other_end_of_valley(best, at_corners);
 }
 
 void PoseEstimator::observe(std::span<const Correspondence> correspondences) {
@@ -209,38 +213,112 @@ PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondenc
   if (!descent || !descent->converged) return result;
   std::optional<Minimum> best = minimum_at(descent->camera_from_target);
   if (!best) return result;
-  std::optional<Minimum> second = second_minimum(*best);
-  if (second && second->cost < best->cost) std::swap(best, second);
-  result.reprojection_rms_px = best->rms_px;
-  if (second) result.ambiguity = second->cost > 0 ? best->cost / second->cost : 1;
+  decide(*best, second_minimum(*best), hints, result);
+  return result;
+}
+
+// Takes the likelier of the two minima by their costs and the hints, or says that neither is.
+void PoseEstimator::decide(Minimum best, std::optional<Minimum> second, std::span<const NormalHint> hints,
+                           PoseResult& result) const {
+  if (second && second->cost < best.cost) std::swap(best, *second);
+  result.reprojection_rms_px = best.rms_px;
+  if (second) result.ambiguity = second->cost > 0 ? best.cost / second->cost : 1;
   // Not "greater than": a NaN is refused too.
   const auto fits = [&](const Minimum& m) { return m.rms_sigmas <= options_.max_rms_sigmas; };
-  if (!fits(*best)) return result;
+  if (!fits(best)) return;
   result.status = PoseStatus::kOk;
-  result.camera_from_target = best->camera_from_target;
-  if (!second || !fits(*second)) return result;  // no alternative, whatever a hint may say
+  result.camera_from_target = best.camera_from_target;
+  if (!second || !fits(*second)) return;  // no alternative, whatever a hint may say
 
-  double evidence = (second->cost - best->cost) * best->bend / best->variance;
+  double evidence = (second->cost - best.cost) * best.bend / best.variance;
   bool hinted = false;
   for (const auto& hint : hints) {
     if (!is_usable(hint)) continue;
     hinted = true;
-    evidence += chi_square(second->camera_from_target, hint) - chi_square(best->camera_from_target, hint);
+    evidence += chi_square(second->camera_from_target, hint) - chi_square(best.camera_from_target, hint);
   }
-  if (evidence < 0) std::swap(best, second);
-  result.reprojection_rms_px = best->rms_px;
-  result.camera_from_target = best->camera_from_target;
+  if (evidence < 0) std::swap(best, *second);
+  result.reprojection_rms_px = best.rms_px;
+  result.camera_from_target = best.camera_from_target;
   result.second = second->camera_from_target;
   // The covariance of the two as a mixture about the better one.
-  const PoseError step = pose_error(best->camera_from_target.mean, second->camera_from_target.mean);
+  const PoseError step = pose_error(best.camera_from_target.mean, second->camera_from_target.mean);
   const Eigen::Vector3d turn = step.tail<3>();
-  const Eigen::Matrix3d of_turn = best->camera_from_target.covariance.bottomRightCorner<3, 3>();
+  const Eigen::Matrix3d of_turn = best.camera_from_target.covariance.bottomRightCorner<3, 3>();
   result.camera_from_target.covariance += step * step.transpose() / (1 + std::exp(std::abs(evidence) / 2));
   const bool decided = std::abs(evidence) >= options_.min_evidence;
   const bool harmless = turn.norm() < options_.same_minimum_deg * kRadFromDeg ||
                         (hinted && turn.dot(of_turn.ldlt().solve(turn)) < kSameWithinNoise);
   if (!decided && !harmless) result.status = PoseStatus::kAmbiguous;
+}
+
+// A minimum of the edges' distances.
+std::optional<PoseEstimator::Minimum> PoseEstimator::descend(const PlaneMeasurement& plane,
+                                                             const Rigid3& start) {
+  const PlaneCost cost(plane, start);
+  PlaneCost::Parameters x = PlaneCost::Parameters::Zero();
+  const auto& summary = plane_solver_.Solve(cost, &x);
+  if (summary.gradient_max_norm < 0 || !x.allFinite() || !faces_camera(cost.pose(x))) return std::nullopt;
+  return minimum_at(plane, cost.pose(x));
+}
+
+// What the homography fits better than any pose of a rigid target, two degrees of freedom, tells of the lens
+// model, the print and the noise.
+std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const PlaneMeasurement& plane,
+                                                                const Rigid3& camera_from_target) const {
+  Minimum minimum;
+  minimum.camera_from_target.mean = camera_from_target;
+  PlaneStep residuals;
+  PlaneCost::Jacobian J;
+  const PlaneCost there(plane, camera_from_target);
+  if (!there(PlaneCost::Parameters::Zero().eval().data(), residuals.data(), J.data())) return std::nullopt;
+  minimum.cost = residuals.squaredNorm();
+  minimum.variance = std::max(1.0, (kPriorFreedom + minimum.cost) / (kPriorFreedom + 2));
+  const double misfit = std::sqrt(minimum.cost / std::max(1, plane.edges)) * plane.sigma_px;
+  minimum.rms_px = std::hypot(plane.rms_px, misfit);
+  minimum.rms_sigmas = options_.max_rms_sigmas * misfit / options_.max_misfit_px;
+  const PoseCovariance information = J.transpose() * J;
+  const Eigen::LDLT<PoseCovariance> ldlt(information);
+  auto& covariance = minimum.camera_from_target.covariance;
+  covariance = minimum.variance * ldlt.solve(PoseCovariance::Identity());
+  if (!ldlt.isPositive() || !covariance.allFinite() || !std::isfinite(minimum.cost)) return std::nullopt;
+  return minimum;
+}
+
+PoseResult PoseEstimator::estimate(const PlaneMeasurement& plane, std::span<const NormalHint> hints) {
+  PoseResult result;
+  result.features = plane.edges;
+  // The linear seed where the perspective shows; else both poses of the first order.
+  std::optional<Minimum> best, second;
+  const auto consider = [&](const Rigid3& seed) {
+    auto minimum = descend(plane, seed);
+    if (!minimum) return;
+    const auto apart = [&](const Minimum& other) {
+      return other.camera_from_target.mean.rotation.angularDistance(
+                 minimum->camera_from_target.mean.rotation) > kSameMinimum;
+    };
+    if (!best) {
+      best = minimum;
+    } else if (!apart(*best)) {
+      if (minimum->cost < best->cost) best = minimum;
+    } else if (!second || minimum->cost < second->cost) {
+      second = minimum;
+    }
+  };
+  const PlaneView view{plane.image_from_plane, Eigen::Vector2d::Zero()};
+  if (const auto pair = infinitesimal_poses(view)) std::ranges::for_each(*pair, consider);
+  if (!best || !second) {
+    if (const auto seed = linear_seed(view)) consider(*seed);
+  }
+  if (!best) return result;
+  if (!second)
+    second = other_end_of_valley(*best, [&](const Rigid3& pose) { return minimum_at(plane, pose); });
+  decide(*best, second, hints, result);
   return result;
+}
+
+PoseResult PoseEstimator::estimate(const Detection& detection, std::span<const NormalHint> hints) {
+  return detection.plane ? estimate(*detection.plane, hints) : estimate(detection.correspondences, hints);
 }
 
 }  // namespace perch

@@ -8,6 +8,7 @@
 #include "perch/config/section.h"
 #include "perch/detection/detector.h"
 #include "perch/geometry/uncertainty.h"
+#include "perch/pose/plane_cost.h"
 #include "perch/pose/reprojection.h"
 #include "perch/target/landing_target.h"
 
@@ -19,6 +20,9 @@ struct PoseOptions {
   // Root mean square distance of the corners, in units of their sigma: 1.4 is normal (two coordinates). More
   // than this is a wrong label or no target, not noise.
   double max_rms_sigmas = 4.0;
+  // The same of edges: how far off the homography that they fit a rigid target seen through this camera model
+  // may be. Beyond it the target is bent or the camera model wrong.
+  double max_misfit_px = 1.5;
   // From here on a corner pulls with constant force (Huber), in sigmas: 95 % efficient on Gaussian noise
   // at 1.345 for one coordinate; a little more as these are two.
   double huber_sigmas = 2.0;
@@ -63,6 +67,10 @@ class PoseEstimator {
   // `hints` help to decide between the two minima; they do not move either.
   PoseResult estimate(std::span<const Correspondence> correspondences,
                       std::span<const NormalHint> hints = {});
+  // The same from the edges that a homography stands for.
+  PoseResult estimate(const PlaneMeasurement& plane, std::span<const NormalHint> hints = {});
+  // By the better of what the detector has measured.
+  PoseResult estimate(const Detection& detection, std::span<const NormalHint> hints = {});
 
  private:
   struct Descent {
@@ -77,12 +85,17 @@ class PoseEstimator {
     double variance = 1;                // of the noise in stated ones: psi^2 a degree of freedom
     double bend = 1;                    // mean of psi', 1 when no error is beyond the bound
   };
+  std::optional<Minimum> descend(const PlaneMeasurement& plane, const Rigid3& start);
+  void decide(Minimum best, std::optional<Minimum> second, std::span<const NormalHint> hints,
+              PoseResult& result) const;
   void observe(std::span<const Correspondence> correspondences);
   std::optional<Rigid3> best_seed();
   std::optional<Descent> descend(const Rigid3& start, double huber, double tolerance);
   std::optional<Minimum> minimum_at(const Rigid3& camera_from_target);
   std::optional<Minimum> second_minimum(const Minimum& best);
-  std::optional<Minimum> other_end_of_valley(const Minimum& best);
+  std::optional<Minimum> minimum_at(const PlaneMeasurement& plane, const Rigid3& camera_from_target) const;
+  template <typename MinimumAt>
+  std::optional<Minimum> other_end_of_valley(const Minimum& best, const MinimumAt& at) const;
 
   std::vector<Eigen::Vector2d> features_;
   CameraModel camera_;
@@ -91,6 +104,7 @@ class PoseEstimator {
   std::vector<Eigen::Vector2d> plane_, image_;
   ReprojectionErrors errors_;
   PoseSolver solver_;  // keeps nothing from one descent to the next
+  PlaneSolver plane_solver_;
 };
 
 }  // namespace perch

@@ -9,9 +9,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "perch/config/atomic_file.h"
 #include "perch/target/draw.h"
 #include "perch/target/png_resolution.h"
-#include "perch/config/atomic_file.h"
 
 namespace perch {
 namespace {
@@ -118,7 +118,8 @@ void write_pdf(const std::vector<Page>& pages, const std::string& title, const f
 
 void write_svg(const Page& page, const fs::path& output) {
   std::string svg;
-  Canvas canvas(cairo_svg_surface_create_for_stream(append_to_string, &svg, page.size.width, page.size.height));
+  Canvas canvas(
+      cairo_svg_surface_create_for_stream(append_to_string, &svg, page.size.width, page.size.height));
   cairo_svg_surface_set_document_unit(canvas.surface(), CAIRO_SVG_UNIT_MM);
   canvas.draw(page, 1);
   canvas.finish();

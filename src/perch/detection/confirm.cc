@@ -1,0 +1,171 @@
+#include "perch/detection/confirm.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perch {
+namespace {
+
+// An edge whose neighbours are nearer than this cannot be told from them.
+constexpr double kLeastRoom = 1.6;  // px
+
+// Nor does a target of which so little can be seen say what it is.
+constexpr int kLeastLines = 12;
+
+}  // namespace
+
+ImageFrame frame_of(const Eigen::Matrix3d& H, const Eigen::Vector2d& centre, double size) {
+  const Eigen::Vector3d p = H * centre.homogeneous();
+  ImageFrame frame;
+  frame.centre = p.hnormalized();
+  const Eigen::Matrix2d by_q = (H.topLeftCorner<2, 2>() - frame.centre * H.row(2).head<2>()) / p.z();
+  frame.radius = 0.5 * size * by_q.norm() / std::sqrt(2.0);
+  return frame;
+}
+
+Confirmation::Confirmation(const LandingTarget& target, const TargetEdges& edges, const CameraModel& camera)
+    : target_(edges),
+      camera_(camera),
+      size_(target.size),
+      tallies_(edges.edges.size()),
+      seen_(edges.shapes.size()) {}
+
+bool Confirmation::is_met(const Requirement& requirement) {
+  int squares = 0, border_edges = 0, holes = 0, holes_asked = 0, asked = 0, found = 0;
+  for (size_t i = 0; i < target_.shapes.size(); ++i) {
+    const ShapeKind kind = target_.shapes[i].kind;
+    int known = 0, seen = 0;
+    for (size_t k = 4 * i; k < 4 * i + 4; ++k) {
+      const EdgeTally& tally = tallies_[k];
+      // The ground beside the outline may be as pale: nobody can ask for that.
+      if (kind != ShapeKind::kOutline || target_.shapes[i].inner) {
+        found += tally.found;
+        asked += tally.asked;
+      }
+      if (tally.asked < 2) continue;
+      ++known;
+      if (5 * tally.found >= 3 * tally.asked) ++seen;
+    }
+    seen_[i] = seen >= 3 || (known == 2 && seen == 2);
+    if (kind == ShapeKind::kSquare) {
+      squares += seen_[i];
+    } else {
+      border_edges += seen;
+    }
+    if (kind == ShapeKind::kHole) {
+      holes += seen;
+      holes_asked += known;
+    }
+  }
+  // Without the hole it is the other one of the two targets.
+  if (holes_asked >= 3 && 2 * holes < holes_asked) return false;
+  return squares >= requirement.squares && border_edges >= requirement.border_edges && asked >= kLeastLines &&
+         found >= requirement.found * asked;
+}
+
+// The brightest of nine pixels in the middle of a square's place, and the mean of eight around it, a quarter
+// of its side off; of those that are in the picture. Empty where these are few.
+std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const Eigen::Matrix3d& H,
+                                                    const TargetShape& square) const {
+  SquareLevels levels;
+  int inside = 0, around = 0;
+  for (int v = -1; v <= 1; ++v) {
+    for (int u = -1; u <= 1; ++u) {
+      for (const double far : {0.3, 0.75}) {
+        if (u == 0 && v == 0 && far > 0.5) continue;
+        const Eigen::Vector2d q = square.centre + far * square.side * Eigen::Vector2d(u, v);
+        const Eigen::Vector3d p = H * q.homogeneous();
+        const auto pixel = p.z() > 0 ? camera_.pixel_from_camera(p) : std::nullopt;
+        if (!pixel || !(pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= grey.cols - 1 &&
+                        pixel->y() <= grey.rows - 1)) {
+          continue;
+        }
+        const double value = grey.at<uint8_t>(static_cast<int>(std::lround(pixel->y())),
+                                              static_cast<int>(std::lround(pixel->x())));
+        if (far < 0.5) {
+          levels.inside = std::max(levels.inside, value);
+          ++inside;
+        } else {
+          levels.around += value;
+          ++around;
+        }
+      }
+    }
+  }
+  if (inside < 3 || around < 3) return std::nullopt;
+  levels.around /= around;
+  return levels;
+}
+
+// Whether places of squares that were not seen are as black as the interior is in the brightest light that
+// falls on it: what covers a square is rarely that. One such is forgiven if all others are seen.
+bool Confirmation::lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
+  double black = 0, contrast = 255;
+  for (size_t i = 0; i < target_.shapes.size(); ++i) {
+    if (target_.shapes[i].kind != ShapeKind::kSquare || !seen_[i]) continue;
+    const auto levels = levels_of(grey, H, target_.shapes[i]);
+    if (!levels) continue;
+    black = std::max(black, levels->around);
+    contrast = std::min(contrast, levels->inside - levels->around);
+  }
+  int seen = 0, unseen = 0, lacking = 0;
+  for (size_t i = 0; i < target_.shapes.size(); ++i) {
+    int asked = 0;
+    for (size_t k = 4 * i; k < 4 * i + 4; ++k) asked += tallies_[k].asked;
+    if (target_.shapes[i].kind != ShapeKind::kSquare || asked == 0) continue;
+    seen += seen_[i];
+    if (seen_[i]) continue;
+    ++unseen;
+    const auto levels = levels_of(grey, H, target_.shapes[i]);
+    if (levels && levels->inside < black + 0.3 * std::max(contrast, 0.0)) ++lacking;
+  }
+  return lacking > (unseen == 1 && seen >= 5 ? 1 : 0);
+}
+
+std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
+                                               double radius, const Requirement& requirement) {
+  Confirmed result;
+  result.image_from_plane = towards_camera(image_from_plane);
+  SearchOptions search;
+  search.contrast = requirement.contrast;
+  constexpr int kRounds = 3;
+  PlaneFit fit;
+  for (int round = 0; round <= kRounds; ++round) {
+    Eigen::Matrix3d& H = result.image_from_plane;
+    if (!(H.row(2).dot(Eigen::Vector3d::UnitZ()) > 0) || !H.allFinite()) return std::nullopt;
+    result.frame = frame_of(H, Eigen::Vector2d::Zero(), size_);
+    project_edges(target_, H, camera_, 1e9, pieces_);
+    std::erase_if(pieces_,
+                  [](const EdgePiece& p) { return !(std::min(p.white_room, p.black_room) > kLeastRoom); });
+    search.radius = std::max(1.5, radius / (1 << round));
+    search.lines = round == kRounds ? 7 : 4;
+    search_edges(grey, pieces_, result.frame, search, offsets_, steps_, tallies_);
+    int asked = 0;
+    for (const EdgeTally& tally : tallies_) asked += tally.asked;
+    if (asked < kLeastLines || static_cast<int>(offsets_.size()) < std::max(10, asked / 3))
+      return std::nullopt;
+    fit = fit_plane(offsets_, result.frame, 0.3);
+    H = towards_camera(corrected(H, result.frame, fit.step));
+  }
+  // What is found must be where it should be, not only near.
+  widths_.clear();
+  for (EdgeTally& tally : tallies_) tally.found = 0;
+  for (size_t i = 0; i < offsets_.size(); ++i) {
+    const EdgeOffset& o = offsets_[i];
+    const double left = o.offset - o.jacobian.dot(fit.step) - o.white * fit.growth;
+    if (std::abs(left) > 0.8) continue;
+    ++tallies_[static_cast<size_t>(steps_[i].edge)].found;
+    widths_.push_back(steps_[i].width);
+  }
+  if (!is_met(requirement) || lacks_squares(grey, result.image_from_plane)) return std::nullopt;
+  for (const EdgeTally& tally : tallies_) {
+    result.found += tally.found;
+    result.asked += tally.asked;
+  }
+  const auto middle = widths_.begin() + static_cast<std::ptrdiff_t>(widths_.size() / 2);
+  std::nth_element(widths_.begin(), middle, widths_.end());
+  result.blur = std::clamp(*middle, 0.5, 3.0);
+  return result;
+}
+
+}  // namespace perch

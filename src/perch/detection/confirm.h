@@ -1,0 +1,64 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "perch/detection/edge_search.h"
+
+namespace perch {
+
+// A homography that the picture's edges confirm: enough of what should be seen is, and no square's place is
+// plain black, as no square was ever there.
+struct Confirmed {
+  Eigen::Matrix3d image_from_plane = Eigen::Matrix3d::Identity();
+  ImageFrame frame;
+  int found = 0, asked = 0;  // lines
+  double blur = 0.8;         // deviation across edges, px
+  double score() const { return 2.0 * found - asked; }
+};
+
+// How much must be seen.
+struct Requirement {
+  int squares = 3;       // whole ones
+  int border_edges = 2;  // sides of the border's edges, or of the hole's
+  double found = 0.5;    // of the lines across squares and the border's inner edge
+  double contrast = 12;  // grey levels
+};
+
+// Grey levels in and around a square's place.
+struct SquareLevels {
+  double inside = 0, around = 0;
+};
+
+// Looks for every edge of the target about where a homography puts it, corrects the homography, and says
+// whether it is one. Holds its working memory.
+class Confirmation {
+ public:
+  Confirmation(const LandingTarget& target, const TargetEdges& edges, const CameraModel& camera);
+
+  // `radius`: how far off the homography's edges may be, px.
+  std::optional<Confirmed> confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
+                                   double radius, const Requirement& requirement);
+
+ private:
+  bool is_met(const Requirement& requirement);
+  std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
+                                        const TargetShape& square) const;
+  bool lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
+
+  TargetEdges target_;
+  CameraModel camera_;
+  double size_;
+  std::vector<EdgePiece> pieces_;
+  std::vector<EdgeOffset> offsets_;
+  std::vector<FoundStep> steps_;
+  std::vector<EdgeTally> tallies_;
+  std::vector<double> widths_;
+  std::vector<bool> seen_;  // by shape: whether enough of its edges are
+};
+
+// The part of the ideal image that the target takes up.
+ImageFrame frame_of(const Eigen::Matrix3d& image_from_plane, const Eigen::Vector2d& centre, double size);
+
+}  // namespace perch

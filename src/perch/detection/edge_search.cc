@@ -1,0 +1,104 @@
+#include "perch/detection/edge_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace perch {
+namespace {
+
+constexpr int kMaxRadius = 24;
+
+struct Step {
+  double at = 0;  // along the line, from its middle pixel
+  double contrast = 0, slope = 0;
+};
+
+// The steepest rise of `sign` times the grey values of a line of 2 n + 1 pixels, n - 1 from its middle at
+// most.
+std::optional<Step> steepest(const std::array<int, 2 * kMaxRadius + 5>& line, int n, int sign, int levels) {
+  const auto slope = [&](int i) {
+    return sign * (line[static_cast<size_t>(i + 1)] - line[static_cast<size_t>(i - 1)]);
+  };
+  int best = -1, most = 0;
+  for (int i = 1; i < 2 * n; ++i) {
+    // Of equals the nearer one.
+    if (slope(i) > most || (slope(i) == most && std::abs(i - n) < std::abs(best - n))) {
+      most = slope(i);
+      best = i;
+    }
+  }
+  if (best < 0 || most < levels) return std::nullopt;
+  Step step;
+  step.at = best - n;
+  step.slope = 0.5 * most;
+  if (best > 1 && best < 2 * n - 1) {
+    const double before = slope(best - 1), after = slope(best + 1), bend = 2 * most - before - after;
+    if (bend > 0) step.at += std::clamp(0.5 * (after - before) / bend, -0.5, 0.5);
+  }
+  // The levels on both sides: as far as the grey goes on rising.
+  int low = best - 1, high = best + 1;
+  while (low > 0 && low > best - 4 &&
+         sign * (line[static_cast<size_t>(low)] - line[static_cast<size_t>(low - 1)]) > 0)
+    --low;
+  while (high < 2 * n && high < best + 4 &&
+         sign * (line[static_cast<size_t>(high + 1)] - line[static_cast<size_t>(high)]) > 0)
+    ++high;
+  step.contrast = sign * (line[static_cast<size_t>(high)] - line[static_cast<size_t>(low)]);
+  return step;
+}
+
+}  // namespace
+
+void search_edges(const cv::Mat& grey, std::span<const EdgePiece> pieces, const ImageFrame& frame,
+                  const SearchOptions& options, std::vector<EdgeOffset>& offsets,
+                  std::vector<FoundStep>& steps, std::vector<EdgeTally>& tallies) {
+  offsets.clear();
+  steps.clear();
+  for (EdgeTally& tally : tallies) tally = {};
+  std::array<int, 2 * kMaxRadius + 5> line{};
+  for (const EdgePiece& piece : pieces) {
+    if (piece.edge >= static_cast<int>(tallies.size())) tallies.resize(static_cast<size_t>(piece.edge) + 1);
+    EdgeTally& tally = tallies[static_cast<size_t>(piece.edge)];
+    const double gap = std::min(piece.white_room, piece.black_room);
+    const CrossingLines lines(piece, std::min(2.0, 0.2 * piece.length()));
+    const double cosine = std::abs(lines.along_normal());
+    const double reach = std::min(options.radius, 0.4 * gap) / cosine;
+    const int n = std::clamp(static_cast<int>(std::ceil(reach)) + 1, 2, kMaxRadius);
+    const int count = lines.last() - lines.first() + 1;
+    if (count <= 0) continue;
+    const int wanted = std::min(options.lines, count);
+    for (int k = 0; k < wanted; ++k) {
+      const int at = lines.first() + (2 * k + 1) * count / (2 * wanted);
+      const double crossing = lines.crossing(at);
+      const int middle = static_cast<int>(std::lround(crossing));
+      if (at < 0 || at >= (lines.rows() ? grey.rows : grey.cols)) continue;
+      if (middle < n || middle + n >= (lines.rows() ? grey.cols : grey.rows)) continue;
+      ++tally.asked;
+      if (lines.rows()) {
+        const uint8_t* pixel = grey.ptr<uint8_t>(at) + middle - n;
+        for (int i = 0; i <= 2 * n; ++i) line[static_cast<size_t>(i)] = pixel[i];
+      } else {
+        const uint8_t* pixel = grey.ptr<uint8_t>(middle - n) + at;
+        for (int i = 0; i <= 2 * n; ++i, pixel += grey.step[0]) line[static_cast<size_t>(i)] = *pixel;
+      }
+      const int sign = lines.along_normal() > 0 ? 1 : -1;
+      const auto step = steepest(line, n, sign, static_cast<int>(0.5 * options.contrast));
+      if (!step || step->contrast < options.contrast) continue;
+      const double along_line = middle + step->at - crossing;
+      if (std::abs(along_line) > reach + 0.5) continue;
+      ++tally.found;
+      EdgeOffset offset;
+      offset.jacobian = step_jacobian(piece.image_at(lines.part(at)), piece.gradient, frame);
+      offset.offset = along_line * lines.along_normal();
+      offset.sigma = 0.2;
+      offset.white = -1;
+      offsets.push_back(offset);
+      steps.push_back(
+          {piece.edge, step->contrast, 0.4 * step->contrast / std::max(step->slope, 1.0) * cosine});
+    }
+  }
+}
+
+}  // namespace perch

@@ -1,0 +1,109 @@
+#include "perch/detection/quads.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "perch/detection/corners.h"
+
+namespace perch {
+namespace {
+
+// From here on the corners of a region say more than its box.
+constexpr double kSmallestMeasured = 5;  // px
+
+// Adds the next row's end to one side of a convex outline (`side` 1: the right one).
+void extend(std::vector<Eigen::Vector2d>& chain, const Eigen::Vector2d& p, double side) {
+  while (chain.size() >= 2) {
+    const Eigen::Vector2d& a = chain[chain.size() - 2];
+    const Eigen::Vector2d ab = chain.back() - a, ap = p - a;
+    if (side * (ab.x() * ap.y() - ap.x() * ab.y()) > 0) break;
+    chain.pop_back();
+  }
+  chain.push_back(p);
+}
+
+struct Outline {
+  std::vector<Eigen::Vector2d> left, right;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  double area = 0;  // px, holes filled
+};
+
+void trace(const RunImage& image, const Component& component, int label, int row_step, Outline& outline) {
+  outline.left.clear();
+  outline.right.clear();
+  outline.centre.setZero();
+  outline.area = 0;
+  for (int y = component.top; y <= component.bottom; ++y) {
+    const RunImage::Row& row = image.rows[static_cast<size_t>(y)];
+    const Run* runs = image.runs.data() + row.first;
+    const Run* end = runs + row.count;
+    const Run* run =
+        std::lower_bound(runs, end, component.left, [](const Run& r, int column) { return r.end <= column; });
+    int begin = image.width, stop = 0;
+    for (; run != end && run->begin <= component.right; ++run) {
+      if (run->label != label) continue;
+      begin = std::min(begin, run->begin);
+      stop = run->end;
+    }
+    if (stop <= begin) continue;
+    const double length = stop - begin, v = y * row_step;
+    outline.area += length * row_step;
+    outline.centre += length * row_step * Eigen::Vector2d(0.5 * (begin + stop - 1), v);
+    extend(outline.left, {begin, v}, -1);
+    extend(outline.right, {stop - 1, v}, 1);
+  }
+  outline.centre /= std::max(outline.area, 1.0);
+}
+
+std::array<Eigen::Vector2d, 4> box_corners(const Component& c, int row_step) {
+  const double left = c.left, right = c.right, top = c.top * row_step, bottom = c.bottom * row_step;
+  return {Eigen::Vector2d(right, top), {left, top}, {left, bottom}, {right, bottom}};
+}
+
+double area_of(const std::array<Eigen::Vector2d, 4>& corners) {
+  double twice = 0;
+  for (size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % 4];
+    twice += b.x() * a.y() - a.x() * b.y();
+  }
+  return twice / 2;
+}
+
+}  // namespace
+
+void find_quads(const Segmentation& s, int row_step, int siblings, std::vector<WhiteQuad>& quads) {
+  quads.clear();
+  Outline outline;
+  const auto count = static_cast<int>(s.components.list.size());
+  for (int label = 1; label < count; ++label) {
+    const Component& c = s.at(label);
+    if (!c.white || s.is_noise(label)) continue;
+    const int around = s.around(label);
+    if (s.holds[static_cast<size_t>(around)] < siblings) continue;
+    const int width = c.right - c.left + 1, height = (c.bottom - c.top + 1) * row_step;
+    // A square seen at any angle down to 15 degrees fills a quarter of its box, whichever way it lies.
+    if (c.area * row_step * 5 < width * height) continue;
+    WhiteQuad quad;
+    quad.around = around;
+    trace(s.image, c, label, row_step, outline);
+    quad.side_px = std::sqrt(outline.area);
+    quad.seen.centre = outline.centre;
+    quad.seen.corners = box_corners(c, row_step);
+    quad.seen.component = label;
+    if (quad.side_px >= kSmallestMeasured) {
+      outline.left.insert(outline.left.end(), outline.right.begin(), outline.right.end());
+      const auto corners = quad_corners(outline.left, outline.centre);
+      if (!corners) continue;
+      quad.seen.corners = *corners;
+      for (auto& corner : quad.seen.corners) {
+        corner += 0.7 * (corner - quad.seen.centre).normalized();
+      }
+      const double area = area_of(quad.seen.corners);
+      quad.four_sided = std::abs(area - outline.area) < 0.2 * outline.area + 2 * quad.side_px;
+      if (!quad.four_sided) continue;
+    }
+    quads.push_back(quad);
+  }
+}
+
+}  // namespace perch
