@@ -9,6 +9,9 @@ namespace {
 // An edge whose neighbours are nearer than this cannot be told from them.
 constexpr double kLeastRoom = 1.6;  // px
 
+// Lines across an edge, of the search that counts; before, as few as will do to get there.
+constexpr int kLastLines = 6;
+
 // Nor does a target of which so little can be seen say what it is.
 constexpr int kLeastLines = 12;
 
@@ -128,24 +131,29 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
   result.image_from_plane = towards_camera(image_from_plane);
   SearchOptions search;
   search.contrast = requirement.contrast;
-  constexpr int kRounds = 3;
   PlaneFit fit;
-  for (int round = 0; round <= kRounds; ++round) {
+  // A step that moves nothing by more than this leaves the edges where the next search finds them.
+  constexpr double kNearEnough = 0.7;  // px
+  constexpr int kMaxRounds = 5;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const bool last = search.lines == kLastLines;
     Eigen::Matrix3d& H = result.image_from_plane;
-    if (!(H.row(2).dot(Eigen::Vector3d::UnitZ()) > 0) || !H.allFinite()) return std::nullopt;
+    if (!(H(2, 2) > 0) || !H.allFinite()) return std::nullopt;
     result.frame = frame_of(H, Eigen::Vector2d::Zero(), size_);
     project_edges(target_, H, camera_, 1e9, pieces_);
-    std::erase_if(pieces_,
-                  [](const EdgePiece& p) { return !(std::min(p.white_room, p.black_room) > kLeastRoom); });
-    search.radius = std::max(1.5, radius / (1 << round));
-    search.lines = round == kRounds ? 7 : 4;
+    std::erase_if(pieces_, [](const EdgePiece& p) {
+      return !(std::min(p.white_room, p.black_room) > kLeastRoom);
+    });
+    search.radius = last ? 1.5 : std::max(2.0, radius / (1 << round));
     search_edges(grey, pieces_, result.frame, search, offsets_, steps_, tallies_);
     int asked = 0;
     for (const EdgeTally& tally : tallies_) asked += tally.asked;
-    if (asked < kLeastLines || static_cast<int>(offsets_.size()) < std::max(10, asked / 3))
-      return std::nullopt;
-    fit = fit_plane(offsets_, result.frame, 0.3);
+    if (asked < kLeastLines || static_cast<int>(offsets_.size()) < std::max(10, asked / 3)) return std::nullopt;
+    fit = fit_plane(offsets_, result.frame, 0.3, last ? 2 : 3);
     H = towards_camera(corrected(H, result.frame, fit.step));
+    if (last) break;
+    const double moved = fit.step.norm() * result.frame.radius * camera_.intrinsics()[0];
+    if (moved < kNearEnough || round + 2 == kMaxRounds) search.lines = kLastLines;
   }
   // What is found must be where it should be, not only near.
   widths_.clear();

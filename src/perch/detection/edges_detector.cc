@@ -246,9 +246,10 @@ bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
               options.min_contrast, offsets, measured);
     if (offsets.size() < 10) return false;
     for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, options.systematic_px);
-    fit = fit_plane(offsets, plane.frame, 0.3);
+    fit = fit_plane(offsets, plane.frame, 0.3, 3);
     H = towards_camera(corrected(H, plane.frame, fit.step));
-    if (fit.step.norm() < 1e-4) break;
+    // What is left of half a tenth of a pixel after one step is nothing.
+    if (fit.step.norm() * plane.frame.radius * camera.intrinsics()[0] < 0.15) break;
   }
   plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
   plane.image_from_plane = H;

@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <opencv2/core/hal/intrin.hpp>
 
 namespace perch {
 namespace {
@@ -17,18 +19,62 @@ Eigen::Matrix3d matrix_of(const PlaneStep& d) {
   return D;
 }
 
-Vector9 row_of(const EdgeOffset& o) {
-  Vector9 row;
-  row << o.jacobian, o.white;
-  return row / o.sigma;
+// An offset as a row of the least squares, whitened: eight derivatives, that by growth, the offset itself.
+constexpr int kColumns = 10;
+using Row = std::array<float, 12>;  // three times four, the last two zero
+
+Row row_of(const EdgeOffset& o) {
+  Row row{};
+  const auto per_sigma = static_cast<float>(1 / o.sigma);
+  for (int i = 0; i < 8; ++i) row[static_cast<size_t>(i)] = per_sigma * static_cast<float>(o.jacobian(i));
+  row[8] = per_sigma * static_cast<float>(o.white);
+  row[9] = per_sigma * static_cast<float>(o.offset);
+  return row;
 }
 
-// The median of |residual| as a standard deviation; of few, as large as they are.
-double robust_scale(std::vector<double>& residuals) {
+// The sum of weighted products of rows with themselves, four columns at a time.
+struct Products {
+  cv::v_float32x4 sum[kColumns][3];
+
+  Products() {
+    for (auto& of_row : sum) {
+      for (auto& four : of_row) four = cv::v_setzero_f32();
+    }
+  }
+  void add(const Row& row, float weight) {
+    const cv::v_float32x4 a = cv::v_load(row.data()), b = cv::v_load(row.data() + 4), c = cv::v_load(row.data() + 8);
+    for (int i = 0; i < kColumns; ++i) {
+      const cv::v_float32x4 w = cv::v_setall_f32(weight * row[static_cast<size_t>(i)]);
+      // The matrix is symmetric: from the diagonal's four on.
+      if (i < 4) sum[i][0] += w * a;
+      if (i < 8) sum[i][1] += w * b;
+      sum[i][2] += w * c;
+    }
+  }
+  Eigen::Matrix<double, kColumns, kColumns> matrix() const {
+    Eigen::Matrix<double, kColumns, kColumns> M;
+    for (int i = 0; i < kColumns; ++i) {
+      std::array<float, 12> row{};
+      for (int k = 0; k < 3; ++k) cv::v_store(row.data() + 4 * k, sum[i][k]);
+      for (int j = i; j < kColumns; ++j) M(i, j) = M(j, i) = static_cast<double>(row[static_cast<size_t>(j)]);
+    }
+    return M;
+  }
+};
+
+float residual_of(const Row& row, const std::array<float, 12>& x) {
+  const cv::v_float32x4 products = cv::v_load(row.data()) * cv::v_load(x.data()) +
+                                   cv::v_load(row.data() + 4) * cv::v_load(x.data() + 4) +
+                                   cv::v_load(row.data() + 8) * cv::v_load(x.data() + 8);
+  return -cv::v_reduce_sum(products);
+}
+
+// The median of |residual| as a standard deviation.
+float robust_scale(std::vector<float>& residuals) {
   if (residuals.empty()) return 1;
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   std::nth_element(residuals.begin(), middle, residuals.end());
-  return 1.4826 * *middle;
+  return 1.4826F * *middle;
 }
 
 }  // namespace
@@ -59,58 +105,67 @@ PlaneStep step_jacobian(const Eigen::Vector2d& image, const Eigen::Vector2d& gra
   return row;
 }
 
-PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, double sigma_growth,
+PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, double sigma_growth, int rounds,
                    double steepest) {
+  // Kept from call to call for their memory.
+  thread_local std::vector<Row> rows;
+  thread_local std::vector<float> residuals, sizes;
   PlaneFit fit;
   Vector9 x = Vector9::Zero();
-  Matrix9 information;
-  std::vector<double> residuals;
-  double scale = 0;
-  constexpr int kRounds = 4;
-  for (int round = 0; round < kRounds; ++round) {
-    residuals.clear();
-    for (const EdgeOffset& o : offsets) residuals.push_back(std::abs(o.offset / o.sigma - row_of(o).dot(x)));
-    scale = std::max(robust_scale(residuals), 0.3);
-    information.setZero();
-    Vector9 pull = Vector9::Zero();
-    // Twice the scale: 95 % efficient on Gaussian noise, Cauchy's.
-    const double bound = 2.4 * scale;
-    for (EdgeOffset& o : offsets) {
-      const Vector9 row = row_of(o);
-      const double r = (o.offset / o.sigma - row.dot(x)) / bound;
-      // The first round knows no better than that all are right.
-      o.weight = round == 0 ? 1 / (1 + std::abs(r)) : 1 / (1 + r * r);
-      information.selfadjointView<Eigen::Lower>().rankUpdate(row, o.weight);
-      pull += (o.weight * o.offset / o.sigma) * row;
+  Matrix9 information = Matrix9::Zero();
+  rows.clear();
+  for (const EdgeOffset& o : offsets) rows.push_back(row_of(o));
+  residuals.resize(rows.size());
+  std::array<float, 12> step{};
+  step[9] = -1;
+  float scale = 1;
+  const auto weigh = [&] {
+    for (size_t i = 0; i < rows.size(); ++i) residuals[i] = residual_of(rows[i], step);
+    sizes.resize(rows.size());
+    std::ranges::transform(residuals, sizes.begin(), [](float r) { return std::abs(r); });
+    scale = std::max(robust_scale(sizes), 0.3F);
+  };
+  for (int round = 0; round < rounds; ++round) {
+    weigh();
+    // Twice the scale: 95 % efficient on Gaussian noise, Cauchy's. The first round knows no better than that
+    // all may be right, and doubts the far ones less.
+    const float bound = 2.4F * scale;
+    Products products;
+    for (size_t i = 0; i < rows.size(); ++i) {
+      const float r = std::abs(residuals[i]) / bound, weight = 1 / (1 + (round == 0 ? r : r * r));
+      offsets[i].weight = static_cast<double>(weight);
+      products.add(rows[i], weight);
     }
-    information.template triangularView<Eigen::StrictlyUpper>() = information.transpose();
+    const auto M = products.matrix();
+    information = M.topLeftCorner<9, 9>();
     Matrix9 held = information;
     const double perspective = 1 / std::pow(steepest * frame.radius, 2);
     held(6, 6) += perspective;
     held(7, 7) += perspective;
     held(8, 8) += 1 / (sigma_growth * sigma_growth);
-    held.diagonal() += Vector9::Constant(1e-12 * held.trace());
-    x = held.ldlt().solve(pull);
+    held.diagonal() += Vector9::Constant(1e-9 * held.trace());
+    x = held.ldlt().solve(M.topRightCorner<9, 1>().eval());
     if (!x.allFinite()) {
       x.setZero();
       break;
     }
+    for (int i = 0; i < 9; ++i) step[static_cast<size_t>(i)] = static_cast<float>(x(i));
   }
+  weigh();
   fit.step = x.head<8>();
   fit.growth = x(8);
-  fit.scale = scale;
+  fit.scale = static_cast<double>(scale);
   const Vector9 by_growth = information.col(8);
   const double of_growth = information(8, 8) + 1 / (sigma_growth * sigma_growth);
-  fit.information =
-      information.topLeftCorner<8, 8>() - by_growth.head<8>() * by_growth.head<8>().transpose() / of_growth;
+  fit.information = information.topLeftCorner<8, 8>() -
+                    by_growth.head<8>() * by_growth.head<8>().transpose() / of_growth;
   double squares = 0, weights = 0;
-  for (const EdgeOffset& o : offsets) {
-    const double r = o.offset - o.sigma * row_of(o).dot(x);
-    squares += o.weight * r * r;
-    weights += o.weight;
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double r = offsets[i].sigma * static_cast<double>(residuals[i]);
+    squares += offsets[i].weight * r * r;
+    weights += offsets[i].weight;
   }
   fit.rms_px = weights > 0 ? std::sqrt(squares / weights) : 0;
-  fit.weight = offsets.empty() ? 0 : weights / static_cast<double>(offsets.size());
   return fit;
 }
 

@@ -61,13 +61,13 @@ struct PlaneFit {
   PlaneInformation information = PlaneInformation::Zero();
   double scale = 1;   // robust standard deviation of offsets in sigmas
   double rms_px = 0;  // of the offsets left, weighted by the loss
-  double weight = 0;  // sum of the weights over their number
 };
 
-// Least squares with Cauchy's loss over the offsets, whose weights it leaves in them. The perspective (D6,
+// Least squares with Cauchy's loss over the offsets, in `rounds` of reweighting, whose weights it leaves in them.
+// Sums are of floats: a step is known to a thousandth of itself, which the next one corrects. The perspective (D6,
 // D7), which a small target shows hardly, is held by what is possible at all: `steepest`, the tangent of the
 // greatest tilt.
-PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, double sigma_growth,
+PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, double sigma_growth, int rounds,
                    double steepest = 3);
 
 }  // namespace perch
