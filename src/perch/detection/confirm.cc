@@ -133,18 +133,18 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
   search.contrast = requirement.contrast;
   PlaneFit fit;
   // A step that moves nothing by more than this leaves the edges where the next search finds them.
-  constexpr double kNearEnough = 0.7;  // px
+  constexpr double kNearEnough = 2.5;  // px
   constexpr int kMaxRounds = 5;
   for (int round = 0; round < kMaxRounds; ++round) {
     const bool last = search.lines == kLastLines;
     Eigen::Matrix3d& H = result.image_from_plane;
     if (!(H(2, 2) > 0) || !H.allFinite()) return std::nullopt;
     result.frame = frame_of(H, Eigen::Vector2d::Zero(), size_);
-    project_edges(target_, H, camera_, 1e9, pieces_);
+    project_edges(target_, H, camera_, kWhole, pieces_);
     std::erase_if(pieces_, [](const EdgePiece& p) {
       return !(std::min(p.white_room, p.black_room) > kLeastRoom);
     });
-    search.radius = last ? 1.5 : std::max(2.0, radius / (1 << round));
+    search.radius = last ? 2 : std::max(2.0, radius / (1 << round));
     search_edges(grey, pieces_, result.frame, search, offsets_, steps_, tallies_);
     int asked = 0;
     for (const EdgeTally& tally : tallies_) asked += tally.asked;

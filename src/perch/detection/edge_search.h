@@ -17,7 +17,7 @@ struct EdgeTally {
 
 struct SearchOptions {
   double radius = 4;     // how far from where they are expected edges are looked for, px
-  int lines = 3;         // across an edge
+  int lines = 2;         // across an edge
   double contrast = 10;  // least difference between the two sides, grey levels
 };
 

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <opencv2/core/hal/intrin.hpp>
 
@@ -69,12 +70,19 @@ float residual_of(const Row& row, const std::array<float, 12>& x) {
   return -cv::v_reduce_sum(products);
 }
 
-// The median of |residual| as a standard deviation.
-float robust_scale(std::vector<float>& residuals) {
-  if (residuals.empty()) return 1;
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  return 1.4826F * *middle;
+// The median of |residual| as a standard deviation, to 3 %: from a histogram of their logarithms, which a float's
+// upper bits are.
+float robust_scale(const std::vector<float>& residuals) {
+  constexpr int kShift = 18, kLowest = 127 - 10, kBins = 20 << 5;  // 32 to the octave, from 2^-10 to 2^10
+  std::array<uint16_t, kBins> histogram{};
+  for (const float r : residuals) {
+    const int bin = static_cast<int>(std::bit_cast<uint32_t>(std::abs(r)) >> kShift) - (kLowest << 5);
+    ++histogram[static_cast<size_t>(std::clamp(bin, 0, kBins - 1))];
+  }
+  size_t below = 0;
+  int bin = 0;
+  while (bin < kBins - 1 && 2 * (below += histogram[static_cast<size_t>(bin)]) < residuals.size()) ++bin;
+  return 1.4826F * std::bit_cast<float>(static_cast<uint32_t>(bin + (kLowest << 5)) << kShift);
 }
 
 }  // namespace
@@ -109,7 +117,7 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
                    double steepest) {
   // Kept from call to call for their memory.
   thread_local std::vector<Row> rows;
-  thread_local std::vector<float> residuals, sizes;
+  thread_local std::vector<float> residuals;
   PlaneFit fit;
   Vector9 x = Vector9::Zero();
   Matrix9 information = Matrix9::Zero();
@@ -121,9 +129,7 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
   float scale = 1;
   const auto weigh = [&] {
     for (size_t i = 0; i < rows.size(); ++i) residuals[i] = residual_of(rows[i], step);
-    sizes.resize(rows.size());
-    std::ranges::transform(residuals, sizes.begin(), [](float r) { return std::abs(r); });
-    scale = std::max(robust_scale(sizes), 0.3F);
+    scale = std::max(robust_scale(residuals), 0.3F);
   };
   for (int round = 0; round < rounds; ++round) {
     weigh();
