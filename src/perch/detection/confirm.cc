@@ -141,14 +141,14 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
     if (!(H(2, 2) > 0) || !H.allFinite()) return std::nullopt;
     result.frame = frame_of(H, Eigen::Vector2d::Zero(), size_);
     project_edges(target_, H, camera_, kWhole, pieces_);
-    std::erase_if(pieces_, [](const EdgePiece& p) {
-      return !(std::min(p.white_room, p.black_room) > kLeastRoom);
-    });
+    std::erase_if(pieces_,
+                  [](const EdgePiece& p) { return !(std::min(p.white_room, p.black_room) > kLeastRoom); });
     search.radius = last ? 2 : std::max(2.0, radius / (1 << round));
     search_edges(grey, pieces_, result.frame, search, offsets_, steps_, tallies_);
     int asked = 0;
     for (const EdgeTally& tally : tallies_) asked += tally.asked;
-    if (asked < kLeastLines || static_cast<int>(offsets_.size()) < std::max(10, asked / 3)) return std::nullopt;
+    if (asked < kLeastLines || static_cast<int>(offsets_.size()) < std::max(10, asked / 3))
+      return std::nullopt;
     fit = fit_plane(offsets_, result.frame, 0.3, last ? 2 : 3);
     H = towards_camera(corrected(H, result.frame, fit.step));
     if (last) break;

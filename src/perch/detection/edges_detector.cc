@@ -76,7 +76,7 @@ struct EdgesDetector::Work {
   bool holds(const Confirmed& found, const Eigen::Vector2d& pixel) const;
   bool has_stranger(const Confirmed& found) const;
   bool try_hypotheses(const cv::Mat& grey);
-  void search_regions(const cv::Mat& grey, int row_step);
+  void search_regions(const cv::Mat& grey, int row_step, Stopwatch& stopwatch);
   std::optional<Confirmed> follow(const cv::Mat& grey, const Prediction& prediction);
   bool measure(const cv::Mat& grey, const Confirmed& found);
   void add_corners(const PlaneMeasurement& plane);
@@ -169,8 +169,9 @@ bool EdgesDetector::Work::try_hypotheses(const cv::Mat& grey) {
   return true;
 }
 
-void EdgesDetector::Work::search_regions(const cv::Mat& grey, int row_step) {
+void EdgesDetector::Work::search_regions(const cv::Mat& grey, int row_step, Stopwatch& stopwatch) {
   find_quads(segmentation, row_step, kLeastRegions, quads);
+  stopwatch.lap("quads");
   const auto n = std::get<SquaresLayout>(target.layout).squares.size();
   order.resize(quads.size());
   for (size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -190,7 +191,10 @@ void EdgesDetector::Work::search_regions(const cv::Mat& grey, int row_step) {
     if (std::ranges::any_of(members, known)) continue;
     if (members.size() == n) {
       hypotheses.of_group(quads, members, camera, proposed);
-      if (try_hypotheses(grey)) continue;
+      stopwatch.lap("hypotheses");
+      const bool found = try_hypotheses(grey);
+      stopwatch.lap("verify");
+      if (found) continue;
     }
     // The largest first: they reach farthest.
     std::stable_sort(members.begin(), members.end(),
@@ -200,7 +204,9 @@ void EdgesDetector::Work::search_regions(const cv::Mat& grey, int row_step) {
       if (!quads[seed].four_sided || known(seed)) continue;
       if (++seeds > 12) break;
       hypotheses.of_seed(quads, seed, camera, proposed);
+      stopwatch.lap("hypotheses");
       if (!proposed.empty()) try_hypotheses(grey);
+      stopwatch.lap("verify");
     }
   }
 }
@@ -286,15 +292,13 @@ const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<
     w.detection.threshold = level;
     segment(grey, level, 2, kLeastPixels, w.segmentation);
     stopwatch.lap("segmentation");
-    w.search_regions(grey, 2);
-    stopwatch.lap("verify");
+    w.search_regions(grey, 2, stopwatch);
   }
   if (w.confirmed.empty()) {
     w.contrast.threshold(grey, w.options.min_contrast, w.segmentation.image);
     segment_runs(kLeastPixels, w.segmentation);
     stopwatch.lap("local segmentation");
-    w.search_regions(grey, 1);
-    stopwatch.lap("local verify");
+    w.search_regions(grey, 1, stopwatch);
   }
   if (w.confirmed.empty()) return w.detection;
   if (w.confirmed.size() > 1) {

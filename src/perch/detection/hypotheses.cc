@@ -171,39 +171,28 @@ void Hypotheses::of_group(std::span<const WhiteQuad> quads, std::span<const size
     seen_.back().component = static_cast<int>(i);
   }
   if (!labelling_->label(seen_, labelled_)) return;
-  for (int scale = 0; scale < static_cast<int>(scales_.size()); ++scale) {
-    const auto& squares = scales_[static_cast<size_t>(scale)];
+  // All corners, or where they are too small the centres alone.
+  double smallest = quads[members[0]].side_px;
+  for (const size_t i : members) smallest = std::min(smallest, quads[i].side_px);
+  const bool by_corners = smallest >= kByCorners;
+  image_.clear();
+  for (const SeenSquare& square : labelled_) {
+    for (size_t k = 0; k < (by_corners ? 4 : 1); ++k) {
+      const auto point = ideal(camera, by_corners ? square.corners[k] : square.centre);
+      if (!point) return;
+      image_.push_back(*point);
+    }
+  }
+  for (const auto& squares : scales_) {
     plane_.clear();
-    image_.clear();
-    for (size_t i = 0; i < labelled_.size(); ++i) {
-      const auto centre = ideal(camera, labelled_[i].centre);
-      if (!centre) return;
-      plane_.push_back(squares[i].centre);
-      image_.push_back(*centre);
+    for (const LayoutSquare& square : squares) {
+      const Quad corners =
+          square_corners(square.centre - Eigen::Vector2d::Constant(square.side / 2), square.side);
+      for (size_t k = 0; k < (by_corners ? 4 : 1); ++k)
+        plane_.push_back(by_corners ? corners[k] : square.centre);
     }
-    const auto H = affine_from_points(plane_, image_);
-    if (!H) continue;
-    auto better = refined(quads, scale, *H, camera);
-    // Under strong perspective an affine start misses some: all corners then, as they are labelled.
-    if (!better || better->squares < static_cast<int>(labelled_.size())) {
-      plane_.clear();
-      image_.clear();
-      for (size_t i = 0; i < labelled_.size(); ++i) {
-        const Quad corners = square_corners(
-            squares[i].centre - Eigen::Vector2d::Constant(squares[i].side / 2), squares[i].side);
-        for (size_t k = 0; k < 4; ++k) {
-          const auto corner = ideal(camera, labelled_[i].corners[k]);
-          if (!corner) return;
-          plane_.push_back(corners[k]);
-          image_.push_back(*corner);
-        }
-      }
-      if (auto strong = homography_from_points(plane_, image_)) {
-        if ((*strong)(2, 2) < 0) *strong = -*strong;
-        if (const auto again = refined(quads, scale, *strong, camera)) better = again;
-      }
-    }
-    if (better) hypotheses.push_back(*better);
+    const auto H = by_corners ? homography_from_points(plane_, image_) : affine_from_points(plane_, image_);
+    if (H) hypotheses.push_back({*H, static_cast<int>(squares.size())});
   }
 }
 

@@ -43,7 +43,8 @@ struct Products {
     }
   }
   void add(const Row& row, float weight) {
-    const cv::v_float32x4 a = cv::v_load(row.data()), b = cv::v_load(row.data() + 4), c = cv::v_load(row.data() + 8);
+    const cv::v_float32x4 a = cv::v_load(row.data()), b = cv::v_load(row.data() + 4),
+                          c = cv::v_load(row.data() + 8);
     for (int i = 0; i < kColumns; ++i) {
       const cv::v_float32x4 w = cv::v_setall_f32(weight * row[static_cast<size_t>(i)]);
       // The matrix is symmetric: from the diagonal's four on.
@@ -70,8 +71,8 @@ float residual_of(const Row& row, const std::array<float, 12>& x) {
   return -cv::v_reduce_sum(products);
 }
 
-// The median of |residual| as a standard deviation, to 3 %: from a histogram of their logarithms, which a float's
-// upper bits are.
+// The median of |residual| as a standard deviation, to 3 %: from a histogram of their logarithms, which a
+// float's upper bits are.
 float robust_scale(const std::vector<float>& residuals) {
   constexpr int kShift = 18, kLowest = 127 - 10, kBins = 20 << 5;  // 32 to the octave, from 2^-10 to 2^10
   std::array<uint16_t, kBins> histogram{};
@@ -163,8 +164,8 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
   fit.scale = static_cast<double>(scale);
   const Vector9 by_growth = information.col(8);
   const double of_growth = information(8, 8) + 1 / (sigma_growth * sigma_growth);
-  fit.information = information.topLeftCorner<8, 8>() -
-                    by_growth.head<8>() * by_growth.head<8>().transpose() / of_growth;
+  fit.information =
+      information.topLeftCorner<8, 8>() - by_growth.head<8>() * by_growth.head<8>().transpose() / of_growth;
   double squares = 0, weights = 0;
   for (size_t i = 0; i < rows.size(); ++i) {
     const double r = offsets[i].sigma * static_cast<double>(residuals[i]);

@@ -63,10 +63,10 @@ struct PlaneFit {
   double rms_px = 0;  // of the offsets left, weighted by the loss
 };
 
-// Least squares with Cauchy's loss over the offsets, in `rounds` of reweighting, whose weights it leaves in them.
-// Sums are of floats: a step is known to a thousandth of itself, which the next one corrects. The perspective (D6,
-// D7), which a small target shows hardly, is held by what is possible at all: `steepest`, the tangent of the
-// greatest tilt.
+// Least squares with Cauchy's loss over the offsets, in `rounds` of reweighting, whose weights it leaves in
+// them. Sums are of floats: a step is known to a thousandth of itself, which the next one corrects. The
+// perspective (D6, D7), which a small target shows hardly, is held by what is possible at all: `steepest`,
+// the tangent of the greatest tilt.
 PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, double sigma_growth, int rounds,
                    double steepest = 3);
 
