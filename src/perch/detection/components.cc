@@ -1,6 +1,7 @@
 #include "perch/detection/components.h"
 
 #include <algorithm>
+#include <span>
 
 namespace perch {
 namespace {
@@ -33,11 +34,52 @@ void grow(Component& c, const Component& by) {
   c.bottom = std::max(c.bottom, by.bottom);
 }
 
-constexpr int kNone = -1;
+// A row of runs whose labels are known.
+struct RowAbove {
+  std::span<const Run> runs;
+  bool first_white = false;
+};
 
-// Joins `label` (kNone: not yet labelled) with what it touches.
-int join(std::vector<Component>& list, int label, int touched) {
-  return label == kNone ? root_of(list, touched) : unite(list, label, touched);
+// Labels the runs of row `y` by what they touch of the same colour in the row above.
+//
+// Colours alternate, so only every second run above is asked; and as runs cover their row, the first one
+// above that our next run, of the other colour, can touch is a neighbour of the first one that lies too far
+// right for this one. Nothing is searched for and no colour compared.
+void label_row(const RowAbove& above, RunImage& image, int y, std::vector<Component>& list) {
+  const RunImage::Row& row = image.rows[static_cast<size_t>(y)];
+  const Run* const over = above.runs.data();
+  const int count = static_cast<int>(above.runs.size());
+  int i = row.first_white == above.first_white ? 0 : 1;
+  for (int k = 0; k < row.count; ++k) {
+    Run& run = image.runs[static_cast<size_t>(row.first + k)];
+    if (i < count && over[i].begin < run.end) {
+      run.label = over[i].label;
+      for (i += 2; i < count && over[i].begin < run.end; i += 2) {
+        if (over[i].label != run.label) run.label = unite(list, run.label, over[i].label);
+      }
+      Component& c = list[static_cast<size_t>(run.label)];
+      c.area += run.end - run.begin;
+      c.left = std::min(c.left, run.begin);
+      c.right = std::max(c.right, run.end - 1);
+      c.top = std::min(c.top, y);  // only the frame's is not yet set
+      c.bottom = y;
+    } else {
+      run.label = static_cast<int>(list.size());
+      list.push_back({run.label, run.end - run.begin, run.begin, y, run.end - 1, y, row.first + k,
+                      image.is_white(row, k)});
+    }
+    i += i <= count && over[i - 1].end <= run.end ? 1 : -1;
+  }
+}
+
+// What is black at the picture's edge is one with the frame.
+void join_frame(const RunImage& image, const RunImage::Row& row, bool last_row,
+                std::vector<Component>& list) {
+  const int step = last_row ? 1 : std::max(row.count - 1, 1);  // else only its first and last run
+  for (int k = 0; k < row.count; k += step) {
+    const Run& run = image.runs[static_cast<size_t>(row.first + k)];
+    if (!image.is_white(row, k)) unite(list, Components::kFrame, run.label);
+  }
 }
 
 }  // namespace
@@ -45,39 +87,15 @@ int join(std::vector<Component>& list, int label, int touched) {
 void label_components(RunImage& image, Components& components) {
   auto& list = components.list;
   list.clear();
-  list.push_back({0, 0, image.width, static_cast<int>(image.rows.size()), -1, -1, -1, false});
-  const int last_row = static_cast<int>(image.rows.size()) - 1;
-  for (int y = 0; y <= last_row; ++y) {
-    const auto& row = image.rows[static_cast<size_t>(y)];
-    const auto& above_row = image.rows[static_cast<size_t>(std::max(y - 1, 0))];
-    const Run* above = image.runs.data() + above_row.first;
-    int k_above = 0;
-    for (int k = 0; k < row.count; ++k) {
-      Run& run = image.runs[static_cast<size_t>(row.first + k)];
-      const bool white = image.is_white(row, k);
-      int label = kNone;
-      if (y > 0) {
-        // The rows are wholly covered, so the run above that holds our first column is where the last run
-        // left off.
-        while (true) {
-          if (image.is_white(above_row, k_above) == white) label = join(list, label, above[k_above].label);
-          if (above[k_above].end >= run.end) break;
-          ++k_above;
-        }
-        if (above[k_above].end == run.end) ++k_above;
-      }
-      const bool at_frame = y == 0 || y == last_row || run.begin == 0 || run.end == image.width;
-      if (!white && at_frame) label = join(list, label, Components::kFrame);
-      const Component piece{0, run.end - run.begin, run.begin, y, run.end - 1, y, row.first + k, white};
-      if (label == kNone) {
-        label = static_cast<int>(list.size());
-        list.push_back(piece);
-        list.back().parent = label;
-      } else {
-        grow(list[static_cast<size_t>(label)], piece);
-      }
-      run.label = label;
-    }
+  const int rows = static_cast<int>(image.rows.size());
+  list.push_back({Components::kFrame, 0, image.width, rows, -1, -1, -1, false});
+  const Run frame{0, image.width, Components::kFrame};
+  RowAbove above{{&frame, 1}, false};
+  for (int y = 0; y < rows; ++y) {
+    const RunImage::Row& row = image.rows[static_cast<size_t>(y)];
+    label_row(above, image, y, list);
+    join_frame(image, row, y + 1 == rows, list);
+    above = {{image.runs.data() + row.first, static_cast<size_t>(row.count)}, row.first_white};
   }
   // A parent is lower than its child and therefore already a root when the child's turn comes.
   for (size_t i = 0; i < list.size(); ++i) {

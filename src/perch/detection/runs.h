@@ -24,6 +24,7 @@ struct RunImage {
   int width = 0;
   std::vector<Row> rows;
   std::vector<Run> runs;
+  std::vector<int> ends;  // working memory of threshold_to_runs
 
   bool is_white(const Row& row, int k) const { return row.first_white != ((k & 1) != 0); }
 };
