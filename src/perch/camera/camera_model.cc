@@ -167,6 +167,7 @@ std::optional<Eigen::Vector3d> CameraModel::ray_from_pixel(const Eigen::Vector2d
   constexpr double kShortestStep = 1e-3;  // of Newton's: shorter ones do not get past an obstacle
   constexpr double kDone = 1e-9;          // rad: the step after it, its square, is below rounding
   constexpr double kMaxMiss = 1e-6;       // px
+  constexpr double kNoMiss = 1e-10;  // px: rounding's own; no step comes nearer, and ten halvings are tried
 
   if (!pixel.allFinite()) return std::nullopt;
   Eigen::Vector3d ray = lens_->first_guess(pixel);
@@ -178,7 +179,7 @@ std::optional<Eigen::Vector3d> CameraModel::ray_from_pixel(const Eigen::Vector2d
     ray = (ray + Eigen::Vector3d::UnitZ()).normalized();
   }
   double miss = (pixel - projected).norm();
-  for (int i = 0; i < kMaxIterations && miss > 0; ++i) {
+  for (int i = 0; i < kMaxIterations && miss > kNoMiss; ++i) {
     Eigen::Matrix<double, 3, 2> tangent;
     tangent.col(0) = ray.unitOrthogonal();
     tangent.col(1) = ray.cross(tangent.col(0));
