@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "perch/estimator/estimator.h"
@@ -17,6 +18,11 @@ inline const std::string kMethods[] = {"paper"};
 inline RunConfig run_config_of(const std::string& method, const std::string& target = "sharp") {
   const std::string text = "{target: targets/" + target + ".yaml, detection: {method: " + method + "}}";
   return read_run_config(Section::parse(text, PERCH_SOURCE_DIR "/configs/run.yaml"));
+}
+
+// The detector of such a run, for those who want to give it predictions of their own.
+inline std::unique_ptr<Detector> detector_of(const RunConfig& config, const CameraModel&) {
+  return make_detector(config.target, config.detection);
 }
 
 // The attitude of a vehicle whose body is the camera, over a level pad that it sees so.
