@@ -159,6 +159,24 @@ std::optional<Eigen::Vector2d> CameraModel::pixel_from_camera(const Eigen::Vecto
   return pixel;
 }
 
+bool CameraModel::pixels_from_camera(std::span<const Eigen::Vector3d> points_camera,
+                                     std::span<Eigen::Vector2d> pixels,
+                                     std::span<Matrix23d> jacobians) const {
+  if (!lens_->opencv) {
+    for (size_t i = 0; i < points_camera.size(); ++i) {
+      if (!lens_->project(points_camera[i], pixels[i], &jacobians[i])) return false;
+    }
+    return true;
+  }
+  const OpencvLens lens = *lens_->opencv;  // a copy no write to a pixel can change: it stays in registers
+  bool finite = true;
+  for (size_t i = 0; i < points_camera.size(); ++i) {
+    if (!lens.project(points_camera[i], pixels[i], &jacobians[i])) return false;
+    finite &= pixels[i].allFinite();
+  }
+  return finite;
+}
+
 // Newton's method on the sphere of directions, with steps that are halved until the pixel comes nearer: it
 // cannot leave the region where the lens can be inverted, since nothing projects there. mrcal_unproject does
 // the same with a general solver in 1.5 us, returns true outside the valid region, and cannot do CAHVORE.

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,11 @@ class CameraModel {
   // ns for the others; CAHVORE's is numeric, good to 1e-9 of the focal length.
   std::optional<Eigen::Vector2d> pixel_from_camera(const Eigen::Vector3d& p_camera,
                                                    Matrix23d* jacobian) const;
+
+  // The same for many points at once, in half the time; false, with nothing promised about the rest, as soon
+  // as one is not seen. All three are as long as `points_camera`.
+  bool pixels_from_camera(std::span<const Eigen::Vector3d> points_camera, std::span<Eigen::Vector2d> pixels,
+                          std::span<Matrix23d> jacobians) const;
 
   // The direction in which a pixel looks, of unit length. Empty when the inversion does not converge, that is
   // when its projection is not the pixel again to 1e-6 px: outside the part of the picture the lens model is

@@ -22,6 +22,10 @@ constexpr double kPriorFreedom = 8;
 constexpr double kDone = 1e-6;
 // In the neighbourhood of a minimum: from there Huber's loss takes over from least squares.
 constexpr double kNear = 1;
+// Of a second minimum the cost is asked for, against differences of units. One that costs less than
+// kInQuestion (five sigma) more than the first may win and is finished; any other is a tenth of a sigma off.
+constexpr double kRough = 0.01;
+constexpr double kInQuestion = 25;
 
 // Minima whose rotations are closer than this are one. In the flat valley of a face seen from far and
 // straight on a descent ends up to 6 % of a deviation (the fourth root of kDone) before the bottom.
@@ -174,7 +178,11 @@ std::optional<PoseEstimator::Minimum> PoseEstimator::second_minimum(const Minimu
   if (!differs(near)) return other_end_of_valley(best, at_corners);
   const auto rough = minimum_at(near->camera_from_target);
   if (!rough || !(rough->rms_sigmas <= options_.max_rms_sigmas)) return rough;
-  const auto bottom = descend(near->camera_from_target, options_.huber_sigmas, kDone);
+  auto bottom = descend(near->camera_from_target, options_.huber_sigmas, kRough);
+  if (!differs(bottom)) return other_end_of_valley(best, at_corners);
+  const auto second = minimum_at(bottom->camera_from_target);
+  if (!second || second->cost - best.cost > kInQuestion * best.variance / best.bend) return second;
+  bottom = descend(bottom->camera_from_target, options_.huber_sigmas, kDone);
   return differs(bottom) ? minimum_at(bottom->camera_from_target) : other_end_of_valley(best, at_corners);
 }
 

@@ -10,38 +10,37 @@ namespace {
 
 constexpr double kUnprojectable = 1e12;  // far above any real sum, far below overflow
 
-// whitened_error with the rotation as a matrix, which for many points is the faster.
-bool whitened_error_at(const CameraModel& camera, const Eigen::Matrix3d& R, const Eigen::Vector3d& p,
-                       const Observation& observation, Eigen::Vector2d* error, PixelJacobian* jacobian) {
-  const Eigen::Vector3d rotated = R * observation.p_target;
-  const Eigen::Vector3d p_camera = rotated + p;
-  Matrix23d by_point;
-  const auto pixel = camera.pixel_from_camera(p_camera, jacobian ? &by_point : nullptr);
-  if (!pixel) return false;
+// From a projection to the whitened error. `rotated` is the point in the camera's axes but from the target's
+// origin.
+inline void whiten(const Eigen::Vector2d& pixel, const Matrix23d& by_point, const Eigen::Vector3d& rotated,
+                   const Observation& observation, Eigen::Vector2d* error, PixelJacobian* jacobian) {
   const double weight = 1 / observation.sigma_px;
-  *error = weight * (*pixel - observation.pixel);
-  if (jacobian) {
-    by_point *= weight;
-    jacobian->leftCols<3>() = by_point;
+  *error = weight * (pixel - observation.pixel);
+  for (int i = 0; i < 2; ++i) {
+    const double x = weight * by_point(i, 0), y = weight * by_point(i, 1), z = weight * by_point(i, 2);
     // d (Exp(r) v) / dr at 0 is -[v]x; a row times -[v]x is (v x row).
-    jacobian->row(0).tail<3>() = rotated.cross(by_point.row(0).transpose()).transpose();
-    jacobian->row(1).tail<3>() = rotated.cross(by_point.row(1).transpose()).transpose();
+    jacobian->row(i) << x, y, z, rotated.y() * z - rotated.z() * y, rotated.z() * x - rotated.x() * z,
+        rotated.x() * y - rotated.y() * x;
   }
-  return true;
 }
 
+// The upper triangle of half the curvature, the rest of which is its mirror image.
 void add_derivatives(const Eigen::Vector2d& error, const PixelJacobian& J, double huber, LossSum* sum) {
   const double distance = error.norm();
   if (distance <= huber) {
     sum->half_gradient.noalias() += J.transpose() * error;
-    sum->half_curvature.noalias() += J.transpose() * J;
+    for (int i = 0; i < 6; ++i) {
+      for (int k = 0; k <= i; ++k) sum->half_curvature(k, i) += J(0, k) * J(0, i) + J(1, k) * J(1, i);
+    }
     return;
   }
   const double weight = huber / distance;
   const Eigen::Vector2d across(-error.y() / distance, error.x() / distance);
   const PoseVector J_across = J.transpose() * across;
   sum->half_gradient.noalias() += J.transpose() * (weight * error);
-  sum->half_curvature.noalias() += (weight * J_across) * J_across.transpose();
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k <= i; ++k) sum->half_curvature(k, i) += (weight * J_across(k)) * J_across(i);
+  }
 }
 
 // The upper triangle U of H = U'U and y = U'^-1 g. A direction in which H has nothing (to rounding) beyond
@@ -65,8 +64,14 @@ void factorise(const LossSum& sum, Eigen::Map<Eigen::Matrix<double, 7, 6>>& U,
 
 bool whitened_error(const CameraModel& camera, const Rigid3& camera_from_target,
                     const Observation& observation, Eigen::Vector2d* error, PixelJacobian* jacobian) {
-  return whitened_error_at(camera, camera_from_target.rotation.toRotationMatrix(),
-                           camera_from_target.translation, observation, error, jacobian);
+  const Eigen::Matrix3d R = camera_from_target.rotation.toRotationMatrix();  // as below, to the last bit
+  const Eigen::Vector3d rotated = R * observation.p_target;
+  Matrix23d by_point;
+  const auto pixel = camera.pixel_from_camera(rotated + camera_from_target.translation, &by_point);
+  if (!pixel) return false;
+  PixelJacobian unwanted;
+  whiten(*pixel, by_point, rotated, observation, error, jacobian ? jacobian : &unwanted);
+  return true;
 }
 
 double huber_loss(double distance, double huber) {
@@ -76,6 +81,10 @@ double huber_loss(double distance, double huber) {
 void ReprojectionErrors::observe(std::span<const Observation> observations) {
   observations_.assign(observations.begin(), observations.end());
   errors_.clear();
+  rotated_.resize(observations.size());
+  points_camera_.resize(observations.size());
+  pixels_.resize(observations.size());
+  by_point_.resize(observations.size());
 }
 
 std::span<const ReprojectionErrors::Error> ReprojectionErrors::at(const Rigid3& camera_from_target) {
@@ -83,14 +92,17 @@ std::span<const ReprojectionErrors::Error> ReprojectionErrors::at(const Rigid3& 
                     camera_from_target.rotation.coeffs() == camera_from_target_.rotation.coeffs();
   if (held) return errors_;
   camera_from_target_ = camera_from_target;
-  errors_.resize(observations_.size());
   const Eigen::Matrix3d R = camera_from_target.rotation.toRotationMatrix();
   for (size_t i = 0; i < observations_.size(); ++i) {
-    if (!whitened_error_at(camera_, R, camera_from_target.translation, observations_[i], &errors_[i].error,
-                           &errors_[i].jacobian)) {
-      errors_.clear();
-      break;
-    }
+    rotated_[i] = R * observations_[i].p_target;
+    points_camera_[i] = rotated_[i] + camera_from_target.translation;
+  }
+  errors_.clear();
+  if (!camera_.pixels_from_camera(points_camera_, pixels_, by_point_)) return errors_;
+  errors_.resize(observations_.size());
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    auto& [error, jacobian] = errors_[i];
+    whiten(pixels_[i], by_point_[i], rotated_[i], observations_[i], &error, &jacobian);
   }
   return errors_;
 }
@@ -111,7 +123,9 @@ bool ReprojectionCost::sum(const PoseVector& x, bool derivatives, LossSum* sum) 
     sum->value += huber_loss(error.norm(), huber_);
     if (derivatives) add_derivatives(error, jacobian, huber_, sum);
   }
-  if (derivatives && !x.isZero(0)) {
+  if (!derivatives) return true;
+  sum->half_curvature.triangularView<Eigen::StrictlyLower>() = sum->half_curvature.transpose();
+  if (!x.isZero(0)) {
     // Exp(r + dr) = Exp(J_l(r) dr) Exp(r).
     const Eigen::Matrix3d left = so3_left_jacobian(x.tail<3>());
     auto& H = sum->half_curvature;

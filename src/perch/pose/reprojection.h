@@ -49,6 +49,9 @@ class ReprojectionErrors {
   CameraModel camera_;
   std::vector<Observation> observations_;
   std::vector<Error> errors_;
+  std::vector<Eigen::Vector3d> rotated_, points_camera_;  // working memory, as are the next two
+  std::vector<Eigen::Vector2d> pixels_;
+  std::vector<Matrix23d> by_point_;
   Rigid3 camera_from_target_;  // where errors_ are; anywhere when there are none
 };
 
