@@ -10,9 +10,8 @@ namespace perch {
 // What is needed to hold the whole frame, from the picture to the estimate, against the truth, whatever the
 // method of detection.
 
-// The methods that are held against it: a new one is added here, and to the expectations of
-// random_scenes_test.cc.
-inline const std::string kMethods[] = {"paper"};
+// The methods that are held against it: a new one is added here.
+inline const std::string kMethods[] = {"paper", "edges"};
 
 // A run with defaults but for `method`, of a target of configs/targets.
 inline RunConfig run_config_of(const std::string& method, const std::string& target = "sharp") {
@@ -21,8 +20,8 @@ inline RunConfig run_config_of(const std::string& method, const std::string& tar
 }
 
 // The detector of such a run, for those who want to give it predictions of their own.
-inline std::unique_ptr<Detector> detector_of(const RunConfig& config, const CameraModel&) {
-  return make_detector(config.target, config.detection);
+inline std::unique_ptr<Detector> detector_of(const RunConfig& config, const CameraModel& camera) {
+  return make_detector(config.target, camera, config.detection);
 }
 
 // The attitude of a vehicle whose body is the camera, over a level pad that it sees so.

@@ -1,7 +1,10 @@
 #include "perch/detection/confirm.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
+#include <span>
 
 namespace perch {
 namespace {
@@ -71,9 +74,11 @@ bool Confirmation::is_met(const Requirement& requirement) {
 std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const Eigen::Matrix3d& H,
                                                     const TargetShape& square) const {
   SquareLevels levels;
+  std::array<double, 8> ring{};
   int inside = 0, around = 0;
   for (int v = -1; v <= 1; ++v) {
     for (int u = -1; u <= 1; ++u) {
+      // Outside, a quarter of the side off: that is a quarter of the way to the next square of sharp.
       for (const double far : {0.3, 0.75}) {
         if (u == 0 && v == 0 && far > 0.5) continue;
         const Eigen::Vector2d q = square.centre + far * square.side * Eigen::Vector2d(u, v);
@@ -89,15 +94,31 @@ std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const E
           levels.inside = std::max(levels.inside, value);
           ++inside;
         } else {
-          levels.around += value;
-          ++around;
+          ring[static_cast<size_t>(around++)] = value;
         }
       }
     }
   }
   if (inside < 3 || around < 3) return std::nullopt;
-  levels.around /= around;
+  const std::span<const double> seen(ring.data(), static_cast<size_t>(around));
+  levels.around = std::accumulate(seen.begin(), seen.end(), 0.0) / around;
+  const double middle = 0.5 * (levels.inside + *std::ranges::min_element(seen));
+  levels.pale_around =
+      static_cast<double>(std::ranges::count_if(seen, [&](double v) { return v > middle; })) / around;
   return levels;
+}
+
+// Whether most of the squares that were seen lie in black by themselves. Those of a checkerboard touch
+// others.
+bool Confirmation::squares_stand_free(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
+  int free = 0, touched = 0;
+  for (size_t i = 0; i < target_.shapes.size(); ++i) {
+    if (target_.shapes[i].kind != ShapeKind::kSquare || !seen_[i]) continue;
+    const auto levels = levels_of(grey, H, target_.shapes[i]);
+    if (!levels) continue;
+    ++(levels->pale_around > 0.3 ? touched : free);
+  }
+  return touched <= free;
 }
 
 // Whether places of squares that were not seen are as black as the interior is in the brightest light that
@@ -165,7 +186,8 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
     ++tallies_[static_cast<size_t>(steps_[i].edge)].found;
     widths_.push_back(steps_[i].width);
   }
-  if (!is_met(requirement) || lacks_squares(grey, result.image_from_plane)) return std::nullopt;
+  const Eigen::Matrix3d& H = result.image_from_plane;
+  if (!is_met(requirement) || lacks_squares(grey, H) || !squares_stand_free(grey, H)) return std::nullopt;
   for (const EdgeTally& tally : tallies_) {
     result.found += tally.found;
     result.asked += tally.asked;

@@ -29,6 +29,7 @@ struct Requirement {
 // Grey levels in and around a square's place.
 struct SquareLevels {
   double inside = 0, around = 0;
+  double pale_around = 0;  // part of the places around that are nearer to white than to black
 };
 
 // Looks for every edge of the target about where a homography puts it, corrects the homography, and says
@@ -46,6 +47,7 @@ class Confirmation {
   std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                         const TargetShape& square) const;
   bool lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
+  bool squares_stand_free(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
 
   TargetEdges target_;
   CameraModel camera_;
