@@ -10,6 +10,7 @@
 #include "bound.h"
 #include "perch/geometry/euler.h"
 #include "perch/simulation/random.h"
+#include "scene.h"
 #include "support/whole_frame.h"
 
 namespace perch {
@@ -21,20 +22,6 @@ const CameraModel& camera() {
   static const CameraModel camera = CameraModel::pinhole(kFocal, kFocal, 319.5, 239.5, 640, 480);
   return camera;
 }
-
-// White is 120 grey levels above black, the noise about 2 on both: read noise, where the shots of a small
-// well would favour black.
-SensorOptions sensor_options() {
-  constexpr double kFullWell = 100'000;
-  return {.exposure = 120.0 / 255 / 0.7, .full_well = kFullWell, .read_noise = 1.9 / 255 * kFullWell};
-}
-SceneOptions scene_options() {
-  SceneOptions scene;
-  scene.white = 0.8;
-  scene.black = 0.1;  // grey 17, where the noise is not clipped
-  return scene;
-}
-constexpr OpticsOptions kOptics{.psf_sigma_px = 0.7};
 
 // 25 degrees of tilt in any direction, any yaw, up to 9 px from the middle of the picture: further out a
 // target 2 m away would leave it.
@@ -55,27 +42,28 @@ cv::Rect covered(double distance) {
   return whole & cv::Rect((whole.width - side) / 2, (whole.height - side) / 2, side, side);
 }
 
-struct View {
+struct Pictured {
   Rigid3 camera_from_target;
   cv::Mat grey;
   PoseCovariance bound;
 };
 
 // Made at the first call for each distance, and kept.
-const std::vector<View>& views(const LandingTarget& target, double distance) {
-  static std::map<double, std::vector<View>> kept;
-  std::vector<View>& views = kept[distance];
+const std::vector<Pictured>& views(const LandingTarget& target, double distance) {
+  static std::map<double, std::vector<Pictured>> kept;
+  std::vector<Pictured>& views = kept[distance];
   if (!views.empty()) return views;
   RandomStream random(20, static_cast<uint64_t>(distance));
   for (int i = 0; i < kPoses; ++i) views.push_back({random_pose(distance, random), {}, {}});
-  const Renderer textured(camera(), target, scene_options(), kOptics);
-  const Renderer even(window(camera(), covered(distance)), target, without_texture(scene_options()), kOptics);
+  const Renderer textured(camera(), target, scene_light(), kSceneOptics);
+  const Renderer even(window(camera(), covered(distance)), target, without_texture(scene_light()),
+                      kSceneOptics);
   cv::parallel_for_(cv::Range(0, kPoses), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
-      View& view = views[static_cast<size_t>(i)];
+      Pictured& view = views[static_cast<size_t>(i)];
       const cv::Mat_<float> light = textured.radiance(view.camera_from_target);
-      view.grey = Sensor(sensor_options()).picture(light, 3, static_cast<uint64_t>(i));
-      view.bound = pose_bound(even, sensor_options(), kTargetSize, view.camera_from_target);
+      view.grey = Sensor(scene_sensor()).picture(light, 3, static_cast<uint64_t>(i));
+      view.bound = pose_bound(even, scene_sensor(), kTargetSize, view.camera_from_target);
     }
   });
   return views;
@@ -87,7 +75,7 @@ struct Errors {
   int found = 0;
   int wrong = 0;  // more than ten of its own sigmas off, and 5 % of the distance
 
-  void add(const View& view, const Estimate& estimate) {
+  void add(const Pictured& view, const Estimate& estimate) {
     if (estimate.status != EstimateStatus::kOk) return;
     ++found;
     const auto& [mean, covariance] = estimate.camera_from_target;
@@ -107,15 +95,15 @@ void accuracy(benchmark::State& state, const RunConfig& config, double distance)
   Estimator estimator(config, camera());
   const auto& shown = views(config.target, distance);
   int number = 0;
-  const auto estimate = [&](const View& view) {
+  const auto estimate = [&](const Pictured& view) {
     return estimator.process(lone_frame(number++, view.grey), level_pad(view.camera_from_target));
   };
   while (state.KeepRunningBatch(kPoses)) {
-    for (const View& view : shown) benchmark::DoNotOptimize(estimate(view));
+    for (const Pictured& view : shown) benchmark::DoNotOptimize(estimate(view));
   }
   Errors errors;
   double bound_m2 = 0;
-  for (const View& view : shown) {
+  for (const Pictured& view : shown) {
     errors.add(view, estimate(view));
     bound_m2 += view.bound.topLeftCorner<3, 3>().trace();
   }

@@ -27,8 +27,8 @@ Prediction near(const Rigid3& truth, RandomStream& random) {
   return {{perturb(truth, error), covariance}};
 }
 
-void frame(benchmark::State& state, cv::Size size, const DetectionOptions& options, bool following) {
-  const Scene& shared = scene(size);
+void frame(benchmark::State& state, const SceneKind& kind, const DetectionOptions& options, bool following) {
+  const Scene& shared = scene(kind);
   const auto detector = make_detector(shared.squares, shared.camera, options);
   PoseEstimator estimator(shared.squares, shared.camera, {});
   std::vector<Shot> shots;
@@ -40,8 +40,8 @@ void frame(benchmark::State& state, cv::Size size, const DetectionOptions& optio
   time_poses(state, shots, find_by(*detector, estimator));
 }
 
-void detection(benchmark::State& state, cv::Size size, const DetectionOptions& options) {
-  const Scene& shared = scene(size);
+void detection(benchmark::State& state, const SceneKind& kind, const DetectionOptions& options) {
+  const Scene& shared = scene(kind);
   const auto detector = make_detector(shared.squares, shared.camera, options);
   std::map<std::string, double> stage_us;
   double pixels = 0, corners = 0, pictures = 0;
@@ -65,8 +65,8 @@ void detection(benchmark::State& state, cv::Size size, const DetectionOptions& o
   state.counters["rms_px"] = std::sqrt(pixels / corners);
 }
 
-void pose(benchmark::State& state, cv::Size size, const DetectionOptions& options) {
-  const Scene& shared = scene(size);
+void pose(benchmark::State& state, const SceneKind& kind, const DetectionOptions& options) {
+  const Scene& shared = scene(kind);
   const auto detector = make_detector(shared.squares, shared.camera, options);
   PoseEstimator estimator(shared.squares, shared.camera, {});
   std::vector<Detection> found;
@@ -81,23 +81,23 @@ void pose(benchmark::State& state, cv::Size size, const DetectionOptions& option
 }
 
 const bool kRegistered = [] {
-  for (const cv::Size size : kResolutions) {
-    const std::string name = "/" + resolution_name(size);
+  for (const SceneKind& kind : kScenes) {
+    const std::string name = "/" + name_of(kind);
     const auto add = [&](const std::string& row, auto run) {
       benchmark::RegisterBenchmark((row + name).c_str(), [=](benchmark::State& state) {
-        run(state, size);
+        run(state, kind);
       })->Unit(benchmark::kMicrosecond);
     };
     for (const auto& [method, which] :
          {std::pair(DetectionMethod::kPaper, "paper"), {DetectionMethod::kEdges, "edges"}}) {
       const DetectionOptions options = by(method);
       const std::string row = which;
-      add(row + "_frame", [=](auto& state, cv::Size s) { frame(state, s, options, false); });
+      add(row + "_frame", [=](auto& state, const SceneKind& k) { frame(state, k, options, false); });
       if (method == DetectionMethod::kEdges) {
-        add(row + "_follow", [=](auto& state, cv::Size s) { frame(state, s, options, true); });
+        add(row + "_follow", [=](auto& state, const SceneKind& k) { frame(state, k, options, true); });
       }
-      add(row + "_detection", [=](auto& state, cv::Size s) { detection(state, s, options); });
-      add(row + "_pose", [=](auto& state, cv::Size s) { pose(state, s, options); });
+      add(row + "_detection", [=](auto& state, const SceneKind& k) { detection(state, k, options); });
+      add(row + "_pose", [=](auto& state, const SceneKind& k) { pose(state, k, options); });
     }
   }
   return true;

@@ -17,8 +17,8 @@ std::vector<Shot> tag_shots(const Scene& scene) {
   return shots;
 }
 
-void libapriltag(benchmark::State& state, cv::Size size, double decimate) {
-  const Scene& shared = scene(size);
+void libapriltag(benchmark::State& state, const SceneKind& kind, double decimate) {
+  const Scene& shared = scene(kind);
   AprilTagOptions options;
   options.quad_decimate = decimate;
   AprilTagDetector detector(std::get<AprilTagBoard>(shared.tag.layout), options);
@@ -38,8 +38,8 @@ std::vector<Correspondence> correspondences(const std::vector<cv::Point2f>& corn
   return list;
 }
 
-void aruco(benchmark::State& state, cv::Size size, bool aruco3) {
-  const Scene& shared = scene(size);
+void aruco(benchmark::State& state, const SceneKind& kind, bool aruco3) {
+  const Scene& shared = scene(kind);
   const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
   const auto parameters = cv::aruco::DetectorParameters::create();
   if (aruco3) {
@@ -64,17 +64,17 @@ void aruco(benchmark::State& state, cv::Size size, bool aruco3) {
 }
 
 const bool kRegistered = [] {
-  for (const cv::Size size : kResolutions) {
-    const std::string name = "/" + resolution_name(size);
+  for (const SceneKind& kind : kScenes) {
+    const std::string name = "/" + name_of(kind);
     const auto add = [&](const std::string& row, auto run) {
       benchmark::RegisterBenchmark((row + name).c_str(), run)->Unit(benchmark::kMicrosecond);
     };
     for (const int decimate : {1, 2}) {
       add("libapriltag_decimate_" + std::to_string(decimate),
-          [=](benchmark::State& state) { libapriltag(state, size, decimate); });
+          [=](benchmark::State& state) { libapriltag(state, kind, decimate); });
     }
-    add("aruco", [=](benchmark::State& state) { aruco(state, size, false); });
-    add("aruco3", [=](benchmark::State& state) { aruco(state, size, true); });
+    add("aruco", [=](benchmark::State& state) { aruco(state, kind, false); });
+    add("aruco3", [=](benchmark::State& state) { aruco(state, kind, true); });
   }
   return true;
 }();

@@ -34,8 +34,4 @@ FindPose find_by(Detector& detector, PoseEstimator& estimator) {
   };
 }
 
-std::string resolution_name(cv::Size size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 }  // namespace perch

@@ -35,6 +35,4 @@ FindPose find_by(Detector& detector, PoseEstimator& estimator);
 // The pose where there is one: an ambiguous pose is an answer too, and counts with its error.
 std::optional<Rigid3> answer(const PoseResult& result);
 
-std::string resolution_name(cv::Size size);  // "640x480"
-
 }  // namespace perch

@@ -35,15 +35,30 @@ Rigid3 random_pose(RandomStream& random) {
   return {rotation, Eigen::Vector3d(random.uniform(-x, x), random.uniform(-y, y), distance)};
 }
 
-Scene make_scene(cv::Size size) {
+SceneOptions scene_of(SceneGround ground) {
+  SceneOptions scene = scene_light();
+  if (ground == SceneGround::kPlain) {
+    scene.ground.contrast = 0;
+    scene.ground.stones = 0;
+  } else if (ground == SceneGround::kBusy) {
+    scene.ground.contrast = 0.6;
+    scene.ground.stones = 400;
+  }
+  return scene;
+}
+
+Scene make_scene(const SceneKind& kind) {
+  const cv::Size size = kind.size;
   const double f = kFocalPerWidth * size.width;
   Scene scene{
       CameraModel::pinhole(f, f, 0.5 * (size.width - 1), 0.5 * (size.height - 1), size.width, size.height),
       squares_target(),
       tag_target(),
       {}};
-  const Renderer squares(scene.camera, scene.squares), tag(scene.camera, scene.tag);
-  const Sensor sensor;
+  const SceneOptions light = scene_of(kind.ground);
+  const Renderer squares(scene.camera, scene.squares, light, kSceneOptics);
+  const Renderer tag(scene.camera, scene.tag, light, kSceneOptics);
+  const Sensor sensor(scene_sensor());
   RandomStream random(20);
   for (uint64_t i = 0; i < kViews; ++i) {
     const Rigid3 pose = random_pose(random);
@@ -55,11 +70,35 @@ Scene make_scene(cv::Size size) {
 
 }  // namespace
 
-const Scene& scene(cv::Size resolution) {
-  static std::map<int, Scene> scenes;
-  const auto found = scenes.find(resolution.width);
+std::string name_of(const SceneKind& kind) {
+  const std::string size = std::to_string(kind.size.width) + "x" + std::to_string(kind.size.height);
+  switch (kind.ground) {
+    case SceneGround::kPlain:
+      return size + "_plain";
+    case SceneGround::kBusy:
+      return size + "_busy";
+    default:
+      return size;
+  }
+}
+
+const Scene& scene(const SceneKind& kind) {
+  static std::map<std::string, Scene> scenes;
+  const auto found = scenes.find(name_of(kind));
   if (found != scenes.end()) return found->second;
-  return scenes.emplace(resolution.width, make_scene(resolution)).first->second;
+  return scenes.emplace(name_of(kind), make_scene(kind)).first->second;
+}
+
+SensorOptions scene_sensor() {
+  constexpr double kFullWell = 100'000;
+  return {.exposure = 120.0 / 255 / 0.7, .full_well = kFullWell, .read_noise = 1.9 / 255 * kFullWell};
+}
+
+SceneOptions scene_light() {
+  SceneOptions scene;
+  scene.white = 0.8;
+  scene.black = 0.1;
+  return scene;
 }
 
 }  // namespace perch

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <opencv2/core.hpp>
-#include <span>
+#include <string>
 #include <vector>
 
 #include "perch/camera/camera_model.h"
 #include "perch/geometry/rigid3.h"
+#include "perch/simulation/renderer.h"
+#include "perch/simulation/sensor.h"
 #include "perch/target/landing_target.h"
 
 namespace perch {
@@ -23,11 +25,33 @@ struct Scene {
   std::vector<View> views;
 };
 
-inline const cv::Size kResolutions[] = {{320, 240}, {640, 480}, {1280, 720}, {1920, 1080}};
+// What lies around the target: nothing, what one flies over, as much as a threshold can stumble over.
+enum class SceneGround { kPlain, kTextured, kBusy };
 
-// Made at the first call for each resolution, and kept. 24 poses from a fixed seed: 2 to 8 m away, tilted by
-// up to 35 degrees, turned anyhow, wholly in view; the same poses at each resolution, a lens of the same 56
-// degrees across.
-const Scene& scene(cv::Size resolution);
+struct SceneKind {
+  cv::Size size;
+  SceneGround ground = SceneGround::kTextured;
+};
+
+inline const SceneKind kScenes[] = {{{320, 240}},
+                                    {{640, 480}, SceneGround::kPlain},
+                                    {{640, 480}},
+                                    {{640, 480}, SceneGround::kBusy},
+                                    {{1280, 720}},
+                                    {{1920, 1080}},
+                                    {{1920, 1080}, SceneGround::kBusy}};
+
+std::string name_of(const SceneKind& kind);  // "640x480", "640x480_busy"
+
+// Made at the first call for each kind, and kept. 24 poses from a fixed seed: 2 to 8 m away, tilted by up to
+// 35 degrees, turned anyhow, wholly in view; the same poses at each resolution, a lens of the same 56 degrees
+// across, and light and noise as below.
+const Scene& scene(const SceneKind& kind);
+
+// White is 120 grey levels above black, the noise about 2 on both: read noise, where the shots of a small
+// well would favour black. Black is grey 17, where the noise is not clipped; the blur 0.7 px.
+SensorOptions scene_sensor();
+SceneOptions scene_light();
+inline constexpr OpticsOptions kSceneOptics{.psf_sigma_px = 0.7};
 
 }  // namespace perch
