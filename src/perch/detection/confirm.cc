@@ -30,11 +30,7 @@ ImageFrame frame_of(const Eigen::Matrix3d& H, const Eigen::Vector2d& centre, dou
 }
 
 Confirmation::Confirmation(const LandingTarget& target, const TargetEdges& edges, const CameraModel& camera)
-    : target_(edges),
-      camera_(camera),
-      size_(target.size),
-      tallies_(edges.edges.size()),
-      seen_(edges.shapes.size()) {}
+    : target_(edges), camera_(camera), size_(target.size), tallies_(edges.edges.size()) {}
 
 bool Confirmation::is_met(const Requirement& requirement) {
   int squares = 0, border_edges = 0, holes = 0, holes_asked = 0, asked = 0, found = 0;
@@ -194,6 +190,7 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
   }
   const auto middle = widths_.begin() + static_cast<std::ptrdiff_t>(widths_.size() / 2);
   std::nth_element(widths_.begin(), middle, widths_.end());
+  result.seen = seen_;
   result.blur = std::clamp(*middle, 0.5, 3.0);
   return result;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -8,13 +9,17 @@
 
 namespace perch {
 
+// Of a target; more squares than anyone can tell apart.
+inline constexpr size_t kMostShapes = 128;
+
 // A homography that the picture's edges confirm: enough of what should be seen is, and no square's place is
 // plain black, as no square was ever there.
 struct Confirmed {
   Eigen::Matrix3d image_from_plane = Eigen::Matrix3d::Identity();
   ImageFrame frame;
-  int found = 0, asked = 0;  // lines
-  double blur = 0.8;         // deviation across edges, px
+  int found = 0, asked = 0;       // lines
+  double blur = 0.8;              // deviation across edges, px
+  std::bitset<kMostShapes> seen;  // by shape: enough of its edges are
   double score() const { return 2.0 * found - asked; }
 };
 
@@ -57,7 +62,7 @@ class Confirmation {
   std::vector<FoundStep> steps_;
   std::vector<EdgeTally> tallies_;
   std::vector<double> widths_;
-  std::vector<bool> seen_;  // by shape: whether enough of its edges are
+  std::bitset<kMostShapes> seen_;  // as in Confirmed
 };
 
 // The part of the ideal image that the target takes up.

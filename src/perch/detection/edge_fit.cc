@@ -45,6 +45,7 @@ struct Sums {
 
 struct Fitted {
   double offset = 0, sigma = 0, contrast = 0;  // along the line, px; grey levels
+  double level = 0;                            // half way up the step, grey levels
   double part = 0.5;                           // of the piece, where its lines are in the mean
 };
 
@@ -62,6 +63,7 @@ std::optional<Fitted> solve(const Sums& s) {
   const double residual = std::max(0.0, cv::v_reduce_sum(s.ii) - b.dot(x));
   const double variance = (residual + 4 * 1.0) / (freedom + 4) + 1.0 / 12;
   Fitted fitted;
+  fitted.level = x(0);
   fitted.contrast = x(1);
   fitted.part = s.part / s.lines;
   fitted.offset = -x(2) / x(1) - s.shift / s.lines;
@@ -184,6 +186,8 @@ void fit_edges(const cv::Mat& grey, std::span<const EdgePiece> pieces, const Ima
     offset.offset = shift * lines.along_normal();
     offset.sigma = fitted->sigma * cosine;
     offset.white = -1;
+    const double height = std::abs(fitted->contrast);
+    offset.modulation = height / std::max(fitted->level + 0.5 * height, 1.0);
     offsets.push_back(offset);
     pieces_measured.push_back(static_cast<int>(i));
   }

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <stdexcept>
 
 #include "perch/detection/confirm.h"
@@ -78,6 +79,7 @@ struct EdgesDetector::Work {
   bool try_hypotheses(const cv::Mat& grey);
   void search_regions(const cv::Mat& grey, int row_step, Stopwatch& stopwatch);
   std::optional<Confirmed> follow(const cv::Mat& grey, const Prediction& prediction);
+  void share_growth();
   bool measure(const cv::Mat& grey, const Confirmed& found);
   void add_corners(const PlaneMeasurement& plane);
 };
@@ -88,6 +90,10 @@ EdgesDetector::EdgesDetector(const LandingTarget& target, const CameraModel& cam
     throw std::invalid_argument("detection.method edges: expected a target of squares");
   }
   work_ = std::make_unique<Work>(target, camera, options);
+  if (work_->edges.shapes.size() > kMostShapes) {
+    throw std::invalid_argument("detection.method edges: expected a target of at most " +
+                                std::to_string(kMostShapes) + " squares and borders");
+  }
 }
 
 EdgesDetector::~EdgesDetector() = default;
@@ -101,7 +107,8 @@ bool EdgesDetector::Work::holds(const Confirmed& found, const Eigen::Vector2d& p
 }
 
 // Whether in the black interior there is a white four-sided region that is no square of the target, nor a
-// piece of one: then it is another panel, of which some squares happen to lie where ours do.
+// piece of one, nor what covers one: then it is another panel, of which some squares happen to lie where ours
+// do.
 bool EdgesDetector::Work::has_stranger(const Confirmed& found) const {
   const Eigen::Matrix3d plane_from_image = found.image_from_plane.inverse();
   const auto on_plane = [&](const Eigen::Vector2d& pixel) -> std::optional<Eigen::Vector2d> {
@@ -115,6 +122,11 @@ bool EdgesDetector::Work::has_stranger(const Confirmed& found) const {
     if (shape.kind == ShapeKind::kInterior) interior = shape.side;
     if (shape.kind == ShapeKind::kSquare) smallest = std::min(smallest, shape.side);
   }
+  const auto shapes = std::views::iota(size_t{0}, edges.shapes.size());
+  const auto is_hidden = [&](size_t i) {
+    return edges.shapes[i].kind == ShapeKind::kSquare && !edges.shapes[i].inner && !found.seen[i];
+  };
+  const auto hidden = std::ranges::count_if(shapes, is_hidden);
   for (const WhiteQuad& quad : quads) {
     if (!quad.four_sided) continue;
     std::array<Eigen::Vector2d, 4> corners;
@@ -130,13 +142,26 @@ bool EdgesDetector::Work::has_stranger(const Confirmed& found) const {
         0.5 * ((corners[0] - corners[2]).norm() + (corners[1] - corners[3]).norm()) / std::sqrt(2.0);
     if (side < 0.6 * smallest) continue;
     const double slack = 0.3 * smallest;
-    const bool explained = std::ranges::any_of(edges.shapes, [&](const TargetShape& shape) {
+    const auto on_shape = [&](size_t i) {
+      const TargetShape& shape = edges.shapes[i];
       if (shape.kind != ShapeKind::kSquare && !shape.inner) return false;
       return std::ranges::all_of(corners, [&](const Eigen::Vector2d& c) {
         return (c - shape.centre).cwiseAbs().maxCoeff() < 0.5 * shape.side + slack;
       });
-    });
-    if (!explained) return true;
+    };
+    if (std::ranges::any_of(shapes, on_shape)) continue;
+    // What covers a square: with all others in sight, or two at once. Another panel's square does neither.
+    const Eigen::Vector2d centre = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
+    const auto touches = [&](size_t i) {
+      return is_hidden(i) &&
+             (centre - edges.shapes[i].centre).cwiseAbs().maxCoeff() < 0.5 * (edges.shapes[i].side + side);
+    };
+    const auto hides = [&](size_t i) {
+      return is_hidden(i) && (centre - edges.shapes[i].centre).norm() < 0.5 * side;
+    };
+    if (hidden == 1 ? std::ranges::any_of(shapes, touches) : std::ranges::count_if(shapes, hides) >= 2)
+      continue;
+    return true;
   }
   return false;
 }
@@ -241,6 +266,30 @@ void EdgesDetector::Work::add_corners(const PlaneMeasurement& plane) {
   }
 }
 
+// How much of the growth each edge has. The outline's step is from a ground of any grey: what a response that
+// is not linear does to it is less by its smaller modulation, from a dark ground to a pale one by the power
+// 1.25 of it for sRGB; what light spread in the lens does is not.
+void EdgesDetector::Work::share_growth() {
+  const auto is_outline = [&](size_t i) {
+    const EdgePiece& piece = pieces[static_cast<size_t>(measured[i])];
+    const TargetShape& shape =
+        edges.shapes[static_cast<size_t>(edges.edges[static_cast<size_t>(piece.edge)].shape)];
+    return shape.kind == ShapeKind::kOutline && !shape.inner;
+  };
+  double sum = 0, count = 0;
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    if (is_outline(i)) continue;
+    sum += offsets[i].modulation;
+    count += 1;
+  }
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    if (!is_outline(i)) continue;
+    const double part = std::min(offsets[i].modulation * count / std::max(sum, 1e-9), 1.0);
+    offsets[i].white = -std::pow(part, 1.25);
+    offsets[i].outline = -1;
+  }
+}
+
 bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
   PlaneMeasurement plane;
   Eigen::Matrix3d H = found.image_from_plane;
@@ -251,7 +300,10 @@ bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
     fit_edges(grey, pieces, plane.frame, templates, {options.lines_per_edge, found.blur},
               options.min_contrast, offsets, measured);
     if (offsets.size() < 10) return false;
-    for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, options.systematic_px);
+    share_growth();
+    // What a fit to a blurred step makes of one bent by the sensor's response differs by its reach.
+    const double bent = 0.1 * fit.growth;
+    for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, options.systematic_px, bent);
     fit = fit_plane(offsets, plane.frame, 0.3, 3);
     H = towards_camera(corrected(H, plane.frame, fit.step));
     // What is left of half a tenth of a pixel after one step is nothing.

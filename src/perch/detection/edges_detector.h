@@ -21,7 +21,7 @@ struct EdgesOptions {
   double min_found = 0.52;
   // What no residual of one frame shows: the print, the lens model, the response's curvature. Of each piece
   // of an edge.
-  double systematic_px = 0.02;
+  double systematic_px = 0.008;
 };
 
 // Reads the section and refuses unknown keys.

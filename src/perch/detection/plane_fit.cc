@@ -11,8 +11,9 @@
 namespace perch {
 namespace {
 
-using Vector9 = Eigen::Matrix<double, 9, 1>;
-using Matrix9 = Eigen::Matrix<double, 9, 9>;
+// A step, the growth of white and what the outline grows otherwise.
+using Unknowns = Eigen::Matrix<double, 10, 1>;
+using Normal = Eigen::Matrix<double, 10, 10>;
 
 Eigen::Matrix3d matrix_of(const PlaneStep& d) {
   Eigen::Matrix3d D;
@@ -20,16 +21,17 @@ Eigen::Matrix3d matrix_of(const PlaneStep& d) {
   return D;
 }
 
-// An offset as a row of the least squares, whitened: eight derivatives, that by growth, the offset itself.
-constexpr int kColumns = 10;
-using Row = std::array<float, 12>;  // three times four, the last two zero
+// An offset as a row of the least squares, whitened: ten derivatives, the offset itself.
+constexpr int kColumns = 11;
+using Row = std::array<float, 12>;  // three times four, the last zero
 
 Row row_of(const EdgeOffset& o) {
   Row row{};
   const auto per_sigma = static_cast<float>(1 / o.sigma);
   for (int i = 0; i < 8; ++i) row[static_cast<size_t>(i)] = per_sigma * static_cast<float>(o.jacobian(i));
   row[8] = per_sigma * static_cast<float>(o.white);
-  row[9] = per_sigma * static_cast<float>(o.offset);
+  row[9] = per_sigma * static_cast<float>(o.outline);
+  row[10] = per_sigma * static_cast<float>(o.offset);
   return row;
 }
 
@@ -120,14 +122,15 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
   thread_local std::vector<Row> rows;
   thread_local std::vector<float> residuals;
   PlaneFit fit;
-  Vector9 x = Vector9::Zero();
-  Matrix9 information = Matrix9::Zero();
+  Unknowns x = Unknowns::Zero();
+  Normal information = Normal::Zero();
   rows.clear();
   for (const EdgeOffset& o : offsets) rows.push_back(row_of(o));
   residuals.resize(rows.size());
   std::array<float, 12> step{};
-  step[9] = -1;
+  step[10] = -1;
   float scale = 1;
+  double sigma_outline = 0.3 * sigma_growth;
   const auto weigh = [&] {
     for (size_t i = 0; i < rows.size(); ++i) residuals[i] = residual_of(rows[i], step);
     scale = std::max(robust_scale(residuals), 0.3F);
@@ -144,28 +147,33 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
       products.add(rows[i], weight);
     }
     const auto M = products.matrix();
-    information = M.topLeftCorner<9, 9>();
-    Matrix9 held = information;
+    information = M.topLeftCorner<10, 10>();
+    Normal held = information;
     const double perspective = 1 / std::pow(steepest * frame.radius, 2);
     held(6, 6) += perspective;
     held(7, 7) += perspective;
     held(8, 8) += 1 / (sigma_growth * sigma_growth);
-    held.diagonal() += Vector9::Constant(1e-9 * held.trace());
-    x = held.ldlt().solve(M.topRightCorner<9, 1>().eval());
+    // Where white does not grow at all, the outline does not either, to a hundredth.
+    sigma_outline = 0.01 + 0.3 * (round == 0 ? sigma_growth : std::abs(x(8)));
+    held(9, 9) += 1 / (sigma_outline * sigma_outline);
+    held.diagonal() += Unknowns::Constant(1e-9 * held.trace());
+    x = held.ldlt().solve(M.topRightCorner<10, 1>().eval());
     if (!x.allFinite()) {
       x.setZero();
       break;
     }
-    for (int i = 0; i < 9; ++i) step[static_cast<size_t>(i)] = static_cast<float>(x(i));
+    for (int i = 0; i < 10; ++i) step[static_cast<size_t>(i)] = static_cast<float>(x(i));
   }
   weigh();
   fit.step = x.head<8>();
   fit.growth = x(8);
   fit.scale = static_cast<double>(scale);
-  const Vector9 by_growth = information.col(8);
-  const double of_growth = information(8, 8) + 1 / (sigma_growth * sigma_growth);
+  Eigen::Matrix2d of_growth = information.bottomRightCorner<2, 2>();
+  of_growth(0, 0) += 1 / (sigma_growth * sigma_growth);
+  of_growth(1, 1) += 1 / (sigma_outline * sigma_outline);
+  const Eigen::Matrix<double, 8, 2> by_growth = information.topRightCorner<8, 2>();
   fit.information =
-      information.topLeftCorner<8, 8>() - by_growth.head<8>() * by_growth.head<8>().transpose() / of_growth;
+      information.topLeftCorner<8, 8>() - by_growth * of_growth.inverse() * by_growth.transpose();
   double squares = 0, weights = 0;
   for (size_t i = 0; i < rows.size(); ++i) {
     const double r = offsets[i].sigma * static_cast<double>(residuals[i]);

@@ -47,11 +47,13 @@ PlaneStep step_jacobian(const Eigen::Vector2d& image, const Eigen::Vector2d& gra
 
 // An edge was found `offset` px from where it was expected, towards its white side.
 struct EdgeOffset {
-  PlaneStep jacobian;  // of the expected place, along the same direction
-  double offset = 0;   // px
-  double sigma = 1;    // px
-  double white = 0;    // how an edge moves when white grows by one px: -1 along its normal
-  double weight = 1;   // of the robust loss
+  PlaneStep jacobian;     // of the expected place, along the same direction
+  double offset = 0;      // px
+  double sigma = 1;       // px
+  double white = 0;       // how an edge moves when white grows by one px: -1 along its normal
+  double outline = 0;     // the same by what the outline grows otherwise
+  double modulation = 0;  // of the step: its height as a part of its upper level
+  double weight = 1;      // of the robust loss
 };
 
 struct PlaneFit {
@@ -66,7 +68,7 @@ struct PlaneFit {
 // Least squares with Cauchy's loss over the offsets, in `rounds` of reweighting, whose weights it leaves in
 // them. Sums are of floats: a step is known to a thousandth of itself, which the next one corrects. The
 // perspective (D6, D7), which a small target shows hardly, is held by what is possible at all: `steepest`,
-// the tangent of the greatest tilt.
+// the tangent of the greatest tilt. The outline's own growth is held to a third of the common one.
 PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, double sigma_growth, int rounds,
                    double steepest = 3);
 

@@ -116,7 +116,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
     const auto normal = level_normal_in_camera(frames_, *aid.world_from_body, aid.angles);
     if (normal) hints.push_back({*normal, gravity_sigma_});
   }
-  const PoseResult pose = pose_.estimate(detection, hints);
+  const PoseResult pose = pose_.estimate(detection, hints, deformation_);
   stopwatch.lap("pose");
   estimate.pose_us = estimate.stages.back().us;
   estimate.status = from_pose(pose.status);
@@ -124,6 +124,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
   estimate.ambiguity = pose.ambiguity;
   estimate.features = pose.features;
   if (estimate.status != EstimateStatus::kOk) return;
+  deformation_ = pose.deformation;
   estimate.camera_from_target = pose.camera_from_target;
   estimate.pad_from_body = pad_from_body_by_vision(frames_, pose.camera_from_target, aid.angles);
   stopwatch.lap("frames");

@@ -40,6 +40,7 @@ class Estimator {
   double gravity_sigma_;  // rad
   std::unique_ptr<Detector> detector_;
   PoseEstimator pose_;
+  Deformation deformation_;
   VehicleFilter filter_;
 };
 

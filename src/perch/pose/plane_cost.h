@@ -24,6 +24,7 @@ class PlaneCost {
   PlaneCost(const PlaneMeasurement& plane, const Rigid3& base);
 
   Rigid3 pose(const Parameters& x) const;
+  const PlaneInformation& root() const { return root_; }  // information = root' root
 
   // Whitened residuals at x and, unless null, their derivative (column-major). False when the target is not
   // before the camera.
@@ -33,7 +34,7 @@ class PlaneCost {
   Rigid3 base_;
   Eigen::Matrix3d from_image_;  // S
   Eigen::Matrix3d to_frame_;    // H^-1 S^-1, of the measured homography
-  PlaneInformation root_;       // information = root' root
+  PlaneInformation root_;
 };
 
 using PlaneSolver = ceres::TinySolver<PlaneCost, Eigen::LDLT<Eigen::Matrix<double, 6, 6>>>;

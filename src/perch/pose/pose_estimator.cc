@@ -293,8 +293,12 @@ std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const PlaneMeasu
   return minimum;
 }
 
-PoseResult PoseEstimator::estimate(const PlaneMeasurement& plane, std::span<const NormalHint> hints) {
+PoseResult PoseEstimator::estimate(const PlaneMeasurement& measured, std::span<const NormalHint> hints,
+                                   const Deformation& usual) {
   PoseResult result;
+  const double per_px = step_per_px(measured, camera_);
+  PlaneMeasurement plane = measured;
+  plane.information = deformed(measured.information, usual.px2(), per_px);
   result.features = plane.edges;
   // The linear seed where the perspective shows; else both poses of the first order.
   std::optional<Minimum> best, second;
@@ -321,12 +325,26 @@ PoseResult PoseEstimator::estimate(const PlaneMeasurement& plane, std::span<cons
   if (!best) return result;
   if (!second)
     second = other_end_of_valley(*best, [&](const Rigid3& pose) { return minimum_at(plane, pose); });
+  if (second && second->cost < best->cost) std::swap(best, second);
+  result.deformation = usual;
+  PlaneStep residuals;
+  PlaneCost::Jacobian J;
+  const PlaneCost there(plane, best->camera_from_target.mean);
+  there(PlaneCost::Parameters::Zero().eval().data(), residuals.data(), J.data());
+  learn(there.root(), J, residuals.squaredNorm(), per_px, result.deformation);
+  plane.information = deformed(measured.information, result.deformation.px2(), per_px);
+  for (auto* minimum : {&best, &second}) {
+    if (*minimum) *minimum = minimum_at(plane, (*minimum)->camera_from_target.mean);
+  }
+  if (!best) return result;
   decide(*best, second, hints, result);
   return result;
 }
 
-PoseResult PoseEstimator::estimate(const Detection& detection, std::span<const NormalHint> hints) {
-  return detection.plane ? estimate(*detection.plane, hints) : estimate(detection.correspondences, hints);
+PoseResult PoseEstimator::estimate(const Detection& detection, std::span<const NormalHint> hints,
+                                   const Deformation& usual) {
+  return detection.plane ? estimate(*detection.plane, hints, usual)
+                         : estimate(detection.correspondences, hints);
 }
 
 }  // namespace perch

@@ -8,6 +8,7 @@
 #include "perch/config/section.h"
 #include "perch/detection/detector.h"
 #include "perch/geometry/uncertainty.h"
+#include "perch/pose/deformation.h"
 #include "perch/pose/plane_cost.h"
 #include "perch/pose/reprojection.h"
 #include "perch/target/landing_target.h"
@@ -56,6 +57,7 @@ struct PoseResult {
   double reprojection_rms_px = 0;  // root of the mean squared distance over the features
   double ambiguity = 0;            // cost of the best pose over that of the second: 0 sure, 1 undecidable
   int features = 0;
+  Deformation deformation;  // of edges: of the frames before and this one
 };
 
 // From correspondences to the pose and its covariance: linear seed, refinement, both planar minima, decision.
@@ -67,10 +69,12 @@ class PoseEstimator {
   // `hints` help to decide between the two minima; they do not move either.
   PoseResult estimate(std::span<const Correspondence> correspondences,
                       std::span<const NormalHint> hints = {});
-  // The same from the edges that a homography stands for.
-  PoseResult estimate(const PlaneMeasurement& plane, std::span<const NormalHint> hints = {});
+  // The same from the edges that a homography stands for; `usual`: of the frames before.
+  PoseResult estimate(const PlaneMeasurement& plane, std::span<const NormalHint> hints = {},
+                      const Deformation& usual = {});
   // By the better of what the detector has measured.
-  PoseResult estimate(const Detection& detection, std::span<const NormalHint> hints = {});
+  PoseResult estimate(const Detection& detection, std::span<const NormalHint> hints = {},
+                      const Deformation& usual = {});
 
  private:
   struct Descent {
