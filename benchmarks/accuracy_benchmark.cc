@@ -48,21 +48,22 @@ struct Pictured {
   PoseCovariance bound;
 };
 
-// Made at the first call for each distance, and kept.
-const std::vector<Pictured>& views(const LandingTarget& target, double distance) {
-  static std::map<double, std::vector<Pictured>> kept;
-  std::vector<Pictured>& views = kept[distance];
+// Made at the first call for each distance and ground, and kept.
+const std::vector<Pictured>& views(const LandingTarget& target, double distance, bool textured) {
+  static std::map<std::pair<double, bool>, std::vector<Pictured>> kept;
+  std::vector<Pictured>& views = kept[{distance, textured}];
   if (!views.empty()) return views;
   RandomStream random(20, static_cast<uint64_t>(distance));
   for (int i = 0; i < kPoses; ++i) views.push_back({random_pose(distance, random), {}, {}});
-  const Renderer textured(camera(), target, scene_light(), kSceneOptics);
+  const SceneOptions light = textured ? scene_light() : without_texture(scene_light());
+  const Renderer renderer(camera(), target, light, kSceneOptics);
   const Renderer even(window(camera(), covered(distance)), target, without_texture(scene_light()),
                       kSceneOptics);
   cv::parallel_for_(cv::Range(0, kPoses), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
       Pictured& view = views[static_cast<size_t>(i)];
-      const cv::Mat_<float> light = textured.radiance(view.camera_from_target);
-      view.grey = Sensor(scene_sensor()).picture(light, 3, static_cast<uint64_t>(i));
+      const cv::Mat_<float> radiance = renderer.radiance(view.camera_from_target);
+      view.grey = Sensor(scene_sensor()).picture(radiance, 3, static_cast<uint64_t>(i));
       view.bound = pose_bound(even, scene_sensor(), kTargetSize, view.camera_from_target);
     }
   });
@@ -91,9 +92,9 @@ struct Errors {
   }
 };
 
-void accuracy(benchmark::State& state, const RunConfig& config, double distance) {
+void accuracy(benchmark::State& state, const RunConfig& config, double distance, bool textured) {
   Estimator estimator(config, camera());
-  const auto& shown = views(config.target, distance);
+  const auto& shown = views(config.target, distance, textured);
   int number = 0;
   const auto estimate = [&](const Pictured& view) {
     return estimator.process(lone_frame(number++, view.grey), level_pad(view.camera_from_target));
@@ -116,14 +117,25 @@ void accuracy(benchmark::State& state, const RunConfig& config, double distance)
   state.counters["wrong"] = errors.wrong;
 }
 
+void add_row(const std::string& name, const RunConfig& config, double distance, bool textured) {
+  benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
+    accuracy(state, config, distance, textured);
+  })->Unit(benchmark::kMicrosecond);
+}
+
 const bool kRegistered = [] {
   for (const std::string& method : kMethods) {
     for (const int distance : {2, 5, 10, 20}) {
       const std::string row = "perch_accuracy/" + method + "/" + std::to_string(distance) + "m";
-      benchmark::RegisterBenchmark(row.c_str(), [=](benchmark::State& state) {
-        accuracy(state, run_config_of(method), distance);
-      })->Unit(benchmark::kMicrosecond);
+      add_row(row, run_config_of(method), distance, false);
+      add_row(row + "_textured", run_config_of(method), distance, true);
     }
+  }
+  // What time buys: lines of the raster across an edge.
+  for (const int lines : {8, 16, 32, 64, 128, 1000}) {
+    RunConfig config = run_config_of("edges");
+    config.detection.edges.lines_per_edge = lines;
+    add_row("perch_lines/" + std::to_string(lines) + "/5m", config, 5, false);
   }
   return true;
 }();

@@ -10,186 +10,271 @@
 namespace perch {
 namespace {
 
-constexpr double kSmallestBlur = 0.45, kBlurRatio = 1.12;
-constexpr int kBlurs = 18;  // up to 3.1 px
-constexpr double kReaches[] = {1.6, 2.2, 3, 4, 5.2, 7};
+// As many deviations of the blur from a step its levels are looked for: it ends after three.
+constexpr double kLevel = 4.5;
 
-double gauss(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * M_PI); }
-double gauss_integral(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
+// Of the pixels' products with the templates: how many each line has.
+constexpr int kNarrow = 8;
+static_assert(StepTemplates::kPixels == 2 * kNarrow);
 
 // Sums over lines, from which level, contrast and offset follow.
 struct Sums {
-  double n = 0, t = 0, g = 0, tt = 0, tg = 0, gg = 0;  // of the templates' products
-  cv::v_int32x4 i, it, ig, ii;                         // of the pixels' with them
-  double shift = 0;  // from the templates' places to the expected, sum over lines
-  double part = 0;   // of the piece, sum over lines
+  float n = 0, t = 0, g = 0, tt = 0, tg = 0, gg = 0, w = 0, tw = 0, gw = 0, ww = 0,
+        xt = 0;                     // of the templates' products
+  cv::v_int32x4 i, it, ig, iw, ii;  // of the pixels' with them
+  double shift = 0;                 // from the templates' places to the expected, sum over lines
+  double part = 0;                  // of the piece, sum over lines
   int lines = 0;
 
-  Sums() : i(cv::v_setzero_s32()), it(i), ig(i), ii(i) {}
+  Sums() : i(cv::v_setzero_s32()), it(i), ig(i), iw(i), ii(i) {}
 
-  void add(const uint8_t* pixels, const StepTemplates::Template& a, double off) {
-    for (int half = 0; half < StepTemplates::kPixels; half += 8) {
-      const cv::v_int16x8 grey = cv::v_reinterpret_as_s16(cv::v_load_expand(pixels + half));
-      const cv::v_int16x8 inside = cv::v_load(a.inside + half);
-      const cv::v_int16x8 seen = grey & inside;
-      i += cv::v_dotprod(seen, cv::v_setall_s16(1));
-      it += cv::v_dotprod(grey, cv::v_load(a.step + half));
-      ig += cv::v_dotprod(grey, cv::v_load(a.slope + half));
-      ii += cv::v_dotprod(seen, seen);
-    }
-    n += a.n, t += a.t, g += a.g, tt += a.tt, tg += a.tg, gg += a.gg;
+  // Eight pixels of a line from the template's pixel `from` on.
+  void add(const uint8_t* pixels, const StepTemplates::Template& a, int from) {
+    const cv::v_int16x8 grey = cv::v_reinterpret_as_s16(cv::v_load_expand(pixels));
+    const cv::v_int16x8 seen = grey & cv::v_load(a.inside + from);
+    i += cv::v_dotprod(seen, cv::v_setall_s16(1));
+    it += cv::v_dotprod(grey, cv::v_load(a.step + from));
+    ig += cv::v_dotprod(grey, cv::v_load(a.slope + from));
+    iw += cv::v_dotprod(grey, cv::v_load(a.narrower + from));
+    ii += cv::v_dotprod(seen, seen);
+  }
+  void add(const StepTemplates::Template& a, double off) {
+    n += a.n, t += a.t, g += a.g, tt += a.tt, tg += a.tg, gg += a.gg, w += a.w, tw += a.tw, gw += a.gw,
+        ww += a.ww, xt += a.xt;
     shift += off;
     ++lines;
   }
 };
 
-struct Fitted {
-  double offset = 0, sigma = 0, contrast = 0;  // along the line, px; grey levels
-  double level = 0;                            // half way up the step, grey levels
-  double part = 0.5;                           // of the piece, where its lines are in the mean
+}  // namespace
+
+// One piece about where it is expected, moved by `shift`: the least squares A x = b of the level half way up,
+// the contrast, and -contrast * offset, all along a line.
+struct EdgeFit::Piece {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero(), own = Eigen::Vector3d::Zero();  // x by this piece alone
+  double variance = 1;  // of a pixel's grey about the step
+  // Of what a narrower blur adds: how much of it there is by this piece alone, its sums.
+  double narrower = 0, ww = 0;
+  Eigen::Vector3d by_w = Eigen::Vector3d::Zero();
+  double xt = 0;       // as in StepTemplates, summed
+  double off = 0;      // from the templates' places to the expected, mean over lines, px
+  double part = 0.5;   // of the piece, where its lines are in the mean
+  double shift = 0;    // px along the lines
+  double blur_px = 1;  // of the templates, along the lines
+  double along_normal = 1;
+  bool rows = true;
+  int index = 0;
+
+  double sign() const { return along_normal > 0 ? 1 : -1; }  // 1: white lies behind black on a line
+  double offset_of(const Eigen::Vector3d& x) const { return -x(2) / x(1) - off; }
 };
 
-std::optional<Fitted> solve(const Sums& s) {
-  if (s.lines == 0) return std::nullopt;
-  Eigen::Matrix3d A;
-  A << s.n, s.t, s.g, s.t, s.tt, s.tg, s.g, s.tg, s.gg;
-  const Eigen::Vector3d b(cv::v_reduce_sum(s.i), cv::v_reduce_sum(s.it) / double{StepTemplates::kOne},
-                          cv::v_reduce_sum(s.ig) / double{StepTemplates::kOne});
-  const Eigen::Matrix3d inverse = A.inverse();
-  const Eigen::Vector3d x = inverse * b;  // level, contrast, -contrast * offset
-  const double freedom = s.n - 3;
-  if (!x.allFinite() || !(freedom > 0)) return std::nullopt;
+namespace {
+
+// By the piece alone. A blur that is not the templates' is odd about the step, as the contrast is, and shifts
+// nothing.
+bool solve(const Sums& s, EdgeFit::Piece& piece) {
+  if (s.lines == 0 || !(s.n > 4)) return false;
+  constexpr double kOne = StepTemplates::kOne;
+  piece.A << s.n, s.t, s.g, s.t, s.tt, s.tg, s.g, s.tg, s.gg;
+  piece.b << cv::v_reduce_sum(s.i), cv::v_reduce_sum(s.it) / kOne, cv::v_reduce_sum(s.ig) / kOne;
+  piece.xt = s.xt;
+  piece.by_w = Eigen::Vector3d(s.w, s.tw, s.gw);
+  piece.ww = s.ww;
+  piece.off = s.shift / s.lines;
+  piece.part = s.part / s.lines;
+  const Eigen::Matrix3d inverse = piece.A.inverse();
+  const Eigen::Vector3d by_narrower = inverse * piece.by_w;
+  const double iw = cv::v_reduce_sum(s.iw) / kOne;
+  const double left = iw - by_narrower.dot(piece.b), own = s.ww - piece.by_w.dot(by_narrower);
+  piece.narrower = own > 1e-3 * s.ww ? left / own : 0;
+  piece.own = inverse * piece.b - by_narrower * piece.narrower;
+  if (!piece.own.allFinite()) return false;
   // Rounding to whole grey levels is a twelfth at least, however small the residuals of a few.
-  const double residual = std::max(0.0, cv::v_reduce_sum(s.ii) - b.dot(x));
-  const double variance = (residual + 4 * 1.0) / (freedom + 4) + 1.0 / 12;
-  Fitted fitted;
-  fitted.level = x(0);
-  fitted.contrast = x(1);
-  fitted.part = s.part / s.lines;
-  fitted.offset = -x(2) / x(1) - s.shift / s.lines;
-  fitted.sigma = std::sqrt(variance * inverse(2, 2)) / std::abs(x(1));
-  return fitted;
+  const double explained = piece.b.dot(piece.own) + iw * piece.narrower;
+  const double residual = std::max(0.0, cv::v_reduce_sum(s.ii) - explained);
+  piece.variance = (residual + 4 * 1.0) / (static_cast<double>(s.n) - 4 + 4) + 1.0 / 12;
+  return true;
 }
 
-// One piece's lines about where it is expected, moved by `shift` px along the lines.
-std::optional<Fitted> fit_lines(const cv::Mat& grey, const CrossingLines& lines, double shift, int step,
-                                const StepTemplates& templates) {
+// One piece's lines about where it is expected, moved by its shift.
+bool fit_lines(const cv::Mat& grey, const CrossingLines& lines, int step, const StepTemplates& templates,
+               bool narrow, EdgeFit::Piece& piece) {
   Sums sums;
   const int count = lines.rows() ? grey.rows : grey.cols, width = lines.rows() ? grey.cols : grey.rows;
+  const int from = narrow ? kNarrow / 2 : 0, pixels = narrow ? kNarrow : 2 * kNarrow;
   uint8_t column[StepTemplates::kPixels];
   for (int at = std::max(lines.first(), 0); at <= std::min(lines.last(), count - 1); at += step) {
-    const double crossing = lines.crossing(at) + shift;
+    const double crossing = lines.crossing(at) + piece.shift;
     const int middle = static_cast<int>(std::floor(crossing + 0.5));
-    const int begin = middle - StepTemplates::kPixels / 2;
-    if (begin < 0 || begin + StepTemplates::kPixels > width) continue;
+    const int begin = middle - pixels / 2;
+    if (begin < 0 || begin + pixels > width) continue;
     sums.part += lines.part(at);
     double phase = crossing - middle;
     const double wanted = phase;
     const auto& a = templates.at(&phase);
+    const uint8_t* line = column;
     if (lines.rows()) {
-      sums.add(grey.ptr<uint8_t>(at) + begin, a, wanted - phase);
+      line = grey.ptr<uint8_t>(at) + begin;
     } else {
       const uint8_t* pixel = grey.ptr<uint8_t>(begin) + at;
-      for (uint8_t& p : column) {
-        p = *pixel;
-        pixel += grey.step[0];
-      }
-      sums.add(column, a, wanted - phase);
+      for (int k = 0; k < pixels; ++k, pixel += grey.step[0]) column[k] = *pixel;
     }
+    sums.add(line, a, from);
+    if (!narrow) sums.add(line + kNarrow, a, kNarrow);
+    sums.add(a, wanted - phase);
   }
-  return solve(sums);
+  return solve(sums, piece);
+}
+
+struct Step {
+  double offset = 0, sigma = 0;  // along the line, px
+  double contrast = 0;
+};
+
+// With what is known of the levels and the blur. Where white changes along the line more than black, the step
+// alone would seem to lie elsewhere.
+Step solve(const EdgeFit::Piece& piece, const LevelSurface::Level& white, const LevelSurface::Level& black) {
+  const int axis = piece.rows ? 0 : 1;
+  const double of_white = white.gradient[axis], of_black = black.gradient[axis];
+  const double more = piece.sign() * (of_white - of_black), mean = 0.5 * (of_white + of_black);
+  Eigen::Vector3d right = piece.b;
+  right -= Eigen::Vector3d(more * piece.xt, mean * piece.xt, more * piece.by_w(1));
+  right /= piece.variance;
+  Eigen::Matrix3d information = piece.A / piece.variance;
+  const auto hold = [&](const LevelSurface::Level& level, double half) {
+    const Eigen::Vector3d u(1, half, 0);
+    information += u * u.transpose() / level.variance;
+    right += u * (level.value / level.variance);
+  };
+  hold(white, 0.5 * piece.sign());
+  hold(black, -0.5 * piece.sign());
+  const Eigen::Matrix3d covariance = information.inverse();
+  const Eigen::Vector3d x = covariance * right;
+  return {piece.offset_of(x), std::sqrt(covariance(2, 2)) / std::abs(x(1)), std::abs(x(1))};
 }
 
 }  // namespace
 
-StepTemplates::StepTemplates(double sigma, double reach) : templates_(kPhases + 1) {
-  for (int k = 0; k <= kPhases; ++k) {
-    Template& a = templates_[static_cast<size_t>(k)];
-    a = {};
-    const double phase = static_cast<double>(k) / kPhases - 0.5;
-    for (int i = 0; i < kPixels; ++i) {
-      const double x = i - kPixels / 2 - phase;
-      if (std::abs(x) > reach) continue;
-      const double step = gauss_integral(x / sigma) - 0.5, slope = gauss(x / sigma) / sigma;
-      a.inside[i] = -1;
-      a.step[i] = static_cast<int16_t>(std::lround(kOne * step));
-      a.slope[i] = static_cast<int16_t>(std::lround(kOne * slope));
-      a.n += 1;
-      a.t += static_cast<float>(step);
-      a.g += static_cast<float>(slope);
-      a.tt += static_cast<float>(step * step);
-      a.tg += static_cast<float>(step * slope);
-      a.gg += static_cast<float>(slope * slope);
+EdgeFit::EdgeFit() = default;
+EdgeFit::~EdgeFit() = default;
+
+bool EdgeFit::fit(const cv::Mat& grey, const EdgePiece& piece, const FitOptions& options,
+                  Piece& fitted) const {
+  const CrossingLines untrimmed(piece, 0);
+  const double cosine = std::abs(untrimmed.along_normal()), sine = std::sqrt(1 - cosine * cosine);
+  // Up to where the next edge's blur begins, and not farther than the step's own reaches.
+  const double room = std::min(piece.white_room, piece.black_room) - 2 * options.blur;
+  const double reach = std::min(std::min(room, kLevel * options.blur) / cosine, kLargestReach);
+  if (reach < kLeastReach) return false;
+  const CrossingLines lines(piece, 2.5 * options.blur + sine * reach * 0.5);
+  const int count = lines.last() - lines.first() + 1;
+  if (count < 1) return false;
+  // An edge has about 8 pieces when long.
+  const int step = std::max(1, count * 4 / std::max(1, options.lines_per_edge));
+  fitted.blur_px = options.blur / cosine;
+  const StepTemplates& table = templates_.of(reach, &fitted.blur_px);
+  fitted.shift = 0;
+  fitted.along_normal = lines.along_normal();
+  fitted.rows = lines.rows();
+  double offset = 0;
+  for (int round = 0; round < 3; ++round) {
+    fitted.shift += offset;
+    if (!fit_lines(grey, lines, step, table, table.reach() <= kNarrow / 2 - 0.5, fitted)) return false;
+    if (!(fitted.own(1) * lines.along_normal() > options.contrast * cosine)) return false;
+    offset = fitted.offset_of(fitted.own);
+    if (!(std::abs(offset) < 2)) return false;
+    if (std::abs(offset) < 0.15) break;
+  }
+  return std::abs(offset) < 0.5 && std::abs(fitted.shift) < 2.5;
+}
+
+void EdgeFit::find_levels(std::span<const EdgePiece> pieces, std::span<const uint8_t> on_ground) {
+  for (Piece& p : fitted_) {
+    const Eigen::Vector2d& normal = pieces[static_cast<size_t>(p.index)].normal;
+    p.narrower =
+        p.own(1) * (1 - std::sqrt(normal.dot(blur_ * normal)) / (std::abs(p.along_normal) * p.blur_px));
+    p.b -= p.narrower * p.by_w;
+    p.own = p.A.inverse() * p.b;
+  }
+  const auto gather = [&](double half, bool ground_too) {
+    samples_.clear();
+    for (const Piece& p : fitted_) {
+      if (!ground_too && on_ground[static_cast<size_t>(p.index)]) continue;
+      const Eigen::Vector3d u(1, half * p.sign(), 0);
+      const double variance = p.variance * u.dot(p.A.inverse() * u);
+      samples_.push_back({pieces[static_cast<size_t>(p.index)].middle, u.dot(p.own), variance});
     }
+  };
+  gather(0.5, true);
+  white_.fit(samples_);
+  gather(-0.5, false);
+  black_.fit(samples_);
+}
+
+// A step that is narrower by a part d than the templates has contrast * d of what a narrower blur adds.
+void EdgeFit::find_blur(std::span<const EdgePiece> pieces, double expected_px) {
+  widths_.clear();
+  for (const Piece& p : fitted_) {
+    const double own = p.ww - p.by_w.dot(p.A.inverse() * p.by_w);
+    if (!(own > 0.02 * p.ww)) continue;
+    const double cosine = std::abs(p.along_normal), part = std::clamp(p.narrower / p.own(1), -1.0, 0.6);
+    const double width = cosine * p.blur_px * (1 - part);
+    const double deviation =
+        2 * width * cosine * p.blur_px * std::sqrt(p.variance / own) / std::abs(p.own(1));
+    widths_.push_back({pieces[static_cast<size_t>(p.index)].normal, width * width, deviation * deviation});
+  }
+  blur_ = fit_blur(widths_, expected_px);
+}
+
+// What a textured ground adds to the residuals is not noise of single pixels: through the blur, those of an
+// area of 4 pi sigma^2 px go together, seven at least.
+void EdgeFit::widen_on_ground(std::span<const uint8_t> on_ground) {
+  constexpr double kTogether = 7;
+  variances_.clear();
+  for (const Piece& p : fitted_) {
+    if (!on_ground[static_cast<size_t>(p.index)]) variances_.push_back(p.variance);
+  }
+  if (variances_.empty()) return;
+  const auto middle = variances_.begin() + static_cast<std::ptrdiff_t>(variances_.size() / 2);
+  std::ranges::nth_element(variances_, middle);
+  for (Piece& p : fitted_) {
+    if (on_ground[static_cast<size_t>(p.index)])
+      p.variance += (kTogether - 1) * std::max(0.0, p.variance - *middle);
   }
 }
 
-const StepTemplates::Template& StepTemplates::at(double* phase) const {
-  const int k = std::clamp(static_cast<int>((*phase + 0.5) * kPhases + 0.5), 0, kPhases);
-  *phase = static_cast<double>(k) / kPhases - 0.5;
-  return templates_[static_cast<size_t>(k)];
-}
-
-StepTemplateTable::StepTemplateTable() {
-  double sigma = kSmallestBlur;
-  for (int i = 0; i < kBlurs; ++i, sigma *= kBlurRatio) {
-    for (const double reach : kReaches) templates_.emplace_back(sigma, reach);
-  }
-}
-
-const StepTemplates& StepTemplateTable::of(double sigma, double reach) const {
-  const double steps = std::log(std::max(sigma, kSmallestBlur) / kSmallestBlur) / std::log(kBlurRatio);
-  const int blur = std::clamp(static_cast<int>(std::lround(steps)), 0, kBlurs - 1);
-  int r = 0;
-  for (int k = 1; k < static_cast<int>(std::size(kReaches)); ++k) {
-    if (reach >= kReaches[k]) r = k;
-  }
-  return templates_[static_cast<size_t>(blur) * std::size(kReaches) + static_cast<size_t>(r)];
-}
-
-void fit_edges(const cv::Mat& grey, std::span<const EdgePiece> pieces, const ImageFrame& frame,
-               const StepTemplateTable& templates, const FitOptions& options, double contrast,
-               std::vector<EdgeOffset>& offsets, std::vector<int>& pieces_measured) {
+void EdgeFit::measure(const cv::Mat& grey, std::span<const EdgePiece> pieces,
+                      std::span<const uint8_t> on_ground, const ImageFrame& frame, const FitOptions& options,
+                      std::vector<EdgeOffset>& offsets, std::vector<int>& pieces_measured) {
   offsets.clear();
   pieces_measured.clear();
+  fitted_.clear();
+  Piece fitted;
   for (size_t i = 0; i < pieces.size(); ++i) {
-    const EdgePiece& piece = pieces[i];
-    const CrossingLines untrimmed(piece, 0);
-    const double cosine = std::abs(untrimmed.along_normal());
-    const double sine = std::sqrt(1 - cosine * cosine);
-    // Up to where the next edge's blur begins.
-    const double room = std::min(piece.white_room, piece.black_room) - 2 * options.blur;
-    const double reach = std::min(room / cosine, 7.0);
-    const double trim = 2 * options.blur + sine * std::clamp(reach, 1.6, 7.0) * 0.5;
-    if (reach < kReaches[0]) continue;
-    const CrossingLines lines(piece, trim);
-    const int count = lines.last() - lines.first() + 1;
-    if (count < 1) continue;
-    // An edge has about 8 pieces when long.
-    const int step = std::max(1, count * 4 / std::max(1, options.lines_per_edge));
-    const StepTemplates& table = templates.of(options.blur / cosine, reach);
-    double shift = 0;
-    std::optional<Fitted> fitted;
-    for (int round = 0; round < 3; ++round) {
-      fitted = fit_lines(grey, lines, shift, step, table);
-      if (!fitted || !(fitted->contrast * lines.along_normal() > contrast * cosine) ||
-          std::abs(fitted->offset) > 2) {
-        fitted.reset();
-        break;
-      }
-      shift += fitted->offset;
-      if (std::abs(fitted->offset) < 0.15) break;
-    }
-    if (!fitted || std::abs(fitted->offset) > 0.5 || std::abs(shift) > 2.5) continue;
+    fitted.index = static_cast<int>(i);
+    if (fit(grey, pieces[i], options, fitted)) fitted_.push_back(fitted);
+  }
+  find_blur(pieces, options.blur);
+  find_levels(pieces, on_ground);
+  widen_on_ground(on_ground);
+  for (const Piece& p : fitted_) {
+    const EdgePiece& piece = pieces[static_cast<size_t>(p.index)];
+    const LevelSurface::Level white = white_.at(piece.middle);
+    // Of the ground nothing is known.
+    const bool of_ground = on_ground[static_cast<size_t>(p.index)] != 0;
+    const LevelSurface::Level black = of_ground ? LevelSurface::Level{} : black_.at(piece.middle);
+    const Step step = solve(p, white, black);
+    if (!(std::abs(step.offset) < 0.5) || !std::isfinite(step.sigma)) continue;
     EdgeOffset offset;
-    offset.jacobian = step_jacobian(piece.image_at(fitted->part), piece.gradient, frame);
-    offset.offset = shift * lines.along_normal();
-    offset.sigma = fitted->sigma * cosine;
+    offset.jacobian = step_jacobian(piece.image_at(p.part), piece.gradient, frame);
+    offset.offset = (p.shift + step.offset) * p.along_normal;
+    offset.sigma = step.sigma * std::abs(p.along_normal);
     offset.white = -1;
-    const double height = std::abs(fitted->contrast);
-    offset.modulation = height / std::max(fitted->level + 0.5 * height, 1.0);
+    offset.modulation = step.contrast / std::max(p.own(0) + 0.5 * step.contrast, 1.0);
     offsets.push_back(offset);
-    pieces_measured.push_back(static_cast<int>(i));
+    pieces_measured.push_back(p.index);
   }
 }
 

@@ -12,6 +12,7 @@
 #include "perch/detection/grey_range.h"
 #include "perch/detection/hypotheses.h"
 #include "perch/detection/local_contrast.h"
+#include "perch/detection/picture_fit.h"
 #include "perch/detection/quads.h"
 #include "perch/detection/stopwatch.h"
 
@@ -33,6 +34,9 @@ constexpr double kPredictionRadius = 10;  // px, beyond which the whole picture 
 // A piece of an edge for the fine fit: an arc over this length is a parabola to a hundredth of a pixel.
 constexpr double kPiece = 32;  // px
 
+// Squares smaller than this are measured by their picture.
+constexpr double kSmallSquare = 7;  // px
+
 }  // namespace
 
 EdgesOptions read_edges_options(Section edges) {
@@ -53,7 +57,8 @@ struct EdgesDetector::Work {
   EdgesOptions options;
   Hypotheses hypotheses;
   Confirmation confirmation;
-  StepTemplateTable templates;
+  EdgeFit edge_fit;
+  PictureFit picture_fit;
   Detection detection;
 
   Segmentation segmentation;
@@ -65,6 +70,7 @@ struct EdgesDetector::Work {
   std::vector<EdgePiece> pieces;
   std::vector<EdgeOffset> offsets;
   std::vector<int> measured;
+  std::vector<uint8_t> on_ground;
 
   Work(const LandingTarget& t, const CameraModel& c, const EdgesOptions& o)
       : target(t),
@@ -72,14 +78,18 @@ struct EdgesDetector::Work {
         camera(c),
         options(o),
         hypotheses(t, edges),
-        confirmation(t, edges, c) {}
+        confirmation(t, edges, c),
+        picture_fit(edges, c) {}
 
   bool holds(const Confirmed& found, const Eigen::Vector2d& pixel) const;
   bool has_stranger(const Confirmed& found) const;
   bool try_hypotheses(const cv::Mat& grey);
   void search_regions(const cv::Mat& grey, int row_step, Stopwatch& stopwatch);
   std::optional<Confirmed> follow(const cv::Mat& grey, const Prediction& prediction);
+  bool is_outline(const EdgePiece& piece) const;
   void share_growth();
+  std::optional<PlaneMeasurement> measure_edges(const cv::Mat& grey, const Confirmed& found);
+  std::optional<PlaneMeasurement> measure_picture(const cv::Mat& grey, const Confirmed& found);
   bool measure(const cv::Mat& grey, const Confirmed& found);
   void add_corners(const PlaneMeasurement& plane);
 };
@@ -266,16 +276,18 @@ void EdgesDetector::Work::add_corners(const PlaneMeasurement& plane) {
   }
 }
 
+// Whether a piece lies between the target and the ground.
+bool EdgesDetector::Work::is_outline(const EdgePiece& piece) const {
+  const TargetEdge& edge = edges.edges[static_cast<size_t>(piece.edge)];
+  const TargetShape& shape = edges.shapes[static_cast<size_t>(edge.shape)];
+  return shape.kind == ShapeKind::kOutline && !shape.inner;
+}
+
 // How much of the growth each edge has. The outline's step is from a ground of any grey: what a response that
 // is not linear does to it is less by its smaller modulation, from a dark ground to a pale one by the power
 // 1.25 of it for sRGB; what light spread in the lens does is not.
 void EdgesDetector::Work::share_growth() {
-  const auto is_outline = [&](size_t i) {
-    const EdgePiece& piece = pieces[static_cast<size_t>(measured[i])];
-    const TargetShape& shape =
-        edges.shapes[static_cast<size_t>(edges.edges[static_cast<size_t>(piece.edge)].shape)];
-    return shape.kind == ShapeKind::kOutline && !shape.inner;
-  };
+  const auto is_outline = [&](size_t i) { return on_ground[static_cast<size_t>(measured[i])] != 0; };
   double sum = 0, count = 0;
   for (size_t i = 0; i < offsets.size(); ++i) {
     if (is_outline(i)) continue;
@@ -290,16 +302,22 @@ void EdgesDetector::Work::share_growth() {
   }
 }
 
-bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
+// By the places of its edges, to a few hundredths of a pixel each.
+std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat& grey,
+                                                                   const Confirmed& found) {
   PlaneMeasurement plane;
   Eigen::Matrix3d H = found.image_from_plane;
   PlaneFit fit;
-  for (int round = 0; round < 3; ++round) {
+  FitOptions how{(options.lines_per_edge + 3) / 4, found.blur, options.min_contrast};
+  // The first round finds the blur and what is left to a tenth of a pixel, of few lines; the next all of it.
+  constexpr int kMostRounds = 3;
+  for (int round = 0; round < kMostRounds; ++round) {
     plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
     project_edges(edges, H, camera, kPiece, pieces);
-    fit_edges(grey, pieces, plane.frame, templates, {options.lines_per_edge, found.blur},
-              options.min_contrast, offsets, measured);
-    if (offsets.size() < 10) return false;
+    on_ground.clear();
+    for (const EdgePiece& piece : pieces) on_ground.push_back(is_outline(piece));
+    edge_fit.measure(grey, pieces, on_ground, plane.frame, how, offsets, measured);
+    if (offsets.size() < 10) return std::nullopt;
     share_growth();
     // What a fit to a blurred step makes of one bent by the sensor's response differs by its reach.
     const double bent = 0.1 * fit.growth;
@@ -307,7 +325,8 @@ bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
     fit = fit_plane(offsets, plane.frame, 0.3, 3);
     H = towards_camera(corrected(H, plane.frame, fit.step));
     // What is left of half a tenth of a pixel after one step is nothing.
-    if (fit.step.norm() * plane.frame.radius * camera.intrinsics()[0] < 0.15) break;
+    if (round > 0 && fit.step.norm() * plane.frame.radius * camera.intrinsics()[0] < 0.15) break;
+    how = {options.lines_per_edge, std::sqrt(0.5 * edge_fit.blur().trace()), options.min_contrast};
   }
   plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
   plane.image_from_plane = H;
@@ -318,8 +337,35 @@ bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
   plane.rms_px = fit.rms_px;
   plane.growth_px = fit.growth;
   plane.edges = static_cast<int>(offsets.size());
+  return plane;
+}
+
+// By the grey levels of its picture, where its edges cannot be told apart.
+std::optional<PlaneMeasurement> EdgesDetector::Work::measure_picture(const cv::Mat& grey,
+                                                                     const Confirmed& found) {
+  const auto fitted =
+      picture_fit.fit(grey, found.image_from_plane, target.size, found.blur, options.min_contrast);
+  if (!fitted) return std::nullopt;
+  PlaneMeasurement plane;
+  plane.image_from_plane = fitted->image_from_plane;
+  plane.frame = fitted->frame;
+  plane.information = fitted->information;
+  plane.rms_px = plane.sigma_px = fitted->rms_px;
+  plane.growth_px = fitted->growth;
+  plane.edges = fitted->pixels;
+  return plane;
+}
+
+bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
+  double smallest = target.size;
+  for (const TargetShape& shape : edges.shapes) smallest = std::min(smallest, shape.side);
+  const double smallest_px = 2 * found.frame.radius * camera.intrinsics()[0] * smallest / target.size;
+  std::optional<PlaneMeasurement> plane;
+  if (smallest_px < kSmallSquare) plane = measure_picture(grey, found);
+  if (!plane) plane = measure_edges(grey, found);
+  if (!plane) return false;
   detection.plane = plane;
-  add_corners(plane);
+  add_corners(*plane);
   return true;
 }
 

@@ -19,9 +19,9 @@ struct EdgesOptions {
   // Part of the lines across the squares' and the border's inner edges that must show the step they should.
   // Three covered squares of six leave 57 %.
   double min_found = 0.52;
-  // What no residual of one frame shows: the print, the lens model, the response's curvature. Of each piece
-  // of an edge.
-  double systematic_px = 0.008;
+  // What no residual of a frame shows, of each piece of an edge: the print. What the whole frame shows (the
+  // lens model, the shutter) is learnt from the frames: pose/deformation.h.
+  double systematic_px = 0.002;
 };
 
 // Reads the section and refuses unknown keys.

@@ -154,7 +154,7 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
     held(7, 7) += perspective;
     held(8, 8) += 1 / (sigma_growth * sigma_growth);
     // Where white does not grow at all, the outline does not either, to a hundredth.
-    sigma_outline = 0.01 + 0.3 * (round == 0 ? sigma_growth : std::abs(x(8)));
+    sigma_outline = 0.0005 + 0.3 * (round == 0 ? sigma_growth : std::abs(x(8)));
     held(9, 9) += 1 / (sigma_outline * sigma_outline);
     held.diagonal() += Unknowns::Constant(1e-9 * held.trace());
     x = held.ldlt().solve(M.topRightCorner<10, 1>().eval());

@@ -1,0 +1,71 @@
+#include "perch/detection/step_templates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace perch {
+namespace {
+
+constexpr double kSmallestBlur = 0.45, kBlurRatio = 1.12;
+constexpr int kBlurs = 18;  // up to 3.1 px
+constexpr double kReaches[] = {kLeastReach, 1.9, 2.2, 2.6, 3, 3.5, 4, 4.6, 5.2, 6, kLargestReach};
+
+double gauss(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * M_PI); }
+double gauss_integral(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
+
+}  // namespace
+
+StepTemplates::StepTemplates(double sigma, double reach) : reach_(reach), templates_(kPhases + 1) {
+  for (int k = 0; k <= kPhases; ++k) {
+    Template& a = templates_[static_cast<size_t>(k)];
+    a = {};
+    const double phase = static_cast<double>(k) / kPhases - 0.5;
+    for (int i = 0; i < kPixels; ++i) {
+      const double x = i - kPixels / 2 - phase;
+      if (std::abs(x) > reach) continue;
+      const double step = gauss_integral(x / sigma) - 0.5, slope = gauss(x / sigma) / sigma;
+      a.inside[i] = -1;
+      a.step[i] = static_cast<int16_t>(std::lround(kOne * step));
+      a.slope[i] = static_cast<int16_t>(std::lround(kOne * slope));
+      a.n += 1;
+      a.t += static_cast<float>(step);
+      a.g += static_cast<float>(slope);
+      a.tt += static_cast<float>(step * step);
+      a.tg += static_cast<float>(step * slope);
+      a.gg += static_cast<float>(slope * slope);
+      a.narrower[i] = static_cast<int16_t>(std::lround(kOne * x * slope));
+      a.w += static_cast<float>(x * slope);
+      a.tw += static_cast<float>(x * step * slope);
+      a.gw += static_cast<float>(x * slope * slope);
+      a.ww += static_cast<float>(x * slope * x * slope);
+      a.xt += static_cast<float>(x * step);
+    }
+  }
+}
+
+const StepTemplates::Template& StepTemplates::at(double* phase) const {
+  const int k = std::clamp(static_cast<int>((*phase + 0.5) * kPhases + 0.5), 0, kPhases);
+  *phase = static_cast<double>(k) / kPhases - 0.5;
+  return templates_[static_cast<size_t>(k)];
+}
+
+StepTemplateTable::StepTemplateTable() {
+  double sigma = kSmallestBlur;
+  for (int i = 0; i < kBlurs; ++i, sigma *= kBlurRatio) {
+    for (const double reach : kReaches) templates_.emplace_back(sigma, reach);
+  }
+}
+
+const StepTemplates& StepTemplateTable::of(double reach, double* sigma) const {
+  const double steps = std::log(std::max(*sigma, kSmallestBlur) / kSmallestBlur) / std::log(kBlurRatio);
+  const int blur = std::clamp(static_cast<int>(std::lround(steps)), 0, kBlurs - 1);
+  *sigma = kSmallestBlur * std::pow(kBlurRatio, blur);
+  int r = 0;
+  for (int k = 1; k < static_cast<int>(std::size(kReaches)); ++k) {
+    if (reach >= kReaches[k]) r = k;
+  }
+  return templates_[static_cast<size_t>(blur) * std::size(kReaches) + static_cast<size_t>(r)];
+}
+
+}  // namespace perch

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace perch {
+
+// How far from a step a line is looked at, px: nearer than the first nothing can be told.
+inline constexpr double kLeastReach = 1.6, kLargestReach = 7;
+
+// A blurred step between two levels as 16 pixels of a line see it, sampled at every 64th of a pixel of its
+// place: what a line is compared with. Fixed point, so that eight pixels cost one instruction.
+class StepTemplates {
+ public:
+  static constexpr int kPixels = 16;  // -8 .. 7 about the line's middle pixel
+  static constexpr int kPhases = 64;
+  static constexpr int kOne = 4096;  // 1 in fixed point
+
+  struct Template {
+    // Within `reach` of the step, elsewhere 0: all bits, the step from -1/2 to 1/2 (kOne is 1), its slope,
+    // and the slope times the place x from the step: what a blur adds that is narrower.
+    alignas(16) int16_t inside[kPixels], step[kPixels], slope[kPixels], narrower[kPixels];
+    // Sums of products of them, the first counting as 1; and of x with the step.
+    float n, t, g, tt, tg, gg, w, tw, gw, ww, xt;
+  };
+
+  // A step blurred by a Gaussian of `sigma` px along the line, looked at within `reach` px (at most 7).
+  StepTemplates(double sigma, double reach);
+
+  // Of a step `phase` px from the middle pixel, -1/2 .. 1/2; `phase` is replaced by what the template has.
+  const Template& at(double* phase) const;
+  double reach() const { return reach_; }
+
+ private:
+  double reach_;
+  std::vector<Template> templates_;
+};
+
+// All blurs and reaches that are asked for, made once.
+class StepTemplateTable {
+ public:
+  StepTemplateTable();
+  // Of about `sigma`, which is replaced by what the templates have, and at most `reach`.
+  const StepTemplates& of(double reach, double* sigma) const;
+
+ private:
+  std::vector<StepTemplates> templates_;
+};
+
+}  // namespace perch
