@@ -47,10 +47,36 @@ Estimator::Aid aid_at(const Flight& flight, const FrameChain& chain, int64_t cam
   return aid;
 }
 
+// What the flight's navigation said up to a frame, as it would have come in a live run.
+class RecordedAutopilot {
+ public:
+  RecordedAutopilot(const NavTrack& nav, const FrameChain& chain) : nav_(nav), chain_(chain) {}
+
+  std::vector<AutopilotSample> until(int64_t camera_time_ns) {
+    std::vector<AutopilotSample> said;
+    const int64_t until_ns = navigation_time_ns(chain_, camera_time_ns);
+    for (; next_ < nav_.samples.size() && nav_.samples[next_].timestamp_ns <= until_ns; ++next_) {
+      const NavSample& nav = nav_.samples[next_];
+      AutopilotSample sample;
+      sample.timestamp_ns = camera_time_ns - (until_ns - nav.timestamp_ns);
+      sample.world_from_body = nav.world_from_body.rotation;
+      sample.body_velocity_in_world = nav.body_velocity_in_world;
+      said.push_back(sample);
+    }
+    return said;
+  }
+
+ private:
+  const NavTrack& nav_;
+  const FrameChain& chain_;
+  size_t next_ = 0;
+};
+
 // Decodes in parallel and estimates in order: a frame's result may depend on those before it.
 void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator,
                      FlightResult& result) {
   using FramePtr = std::shared_ptr<Frame>;
+  RecordedAutopilot autopilot(result.flight.nav, result.chain);
   tbb::parallel_pipeline(
       kFramesAhead,
       tbb::make_filter<void, FramePtr>(tbb::filter_mode::serial_in_order,
@@ -66,7 +92,8 @@ void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& est
                                                  return frame;
                                                }) &
           tbb::make_filter<FramePtr, void>(tbb::filter_mode::serial_in_order, [&](const FramePtr& frame) {
-            const auto aid = aid_at(result.flight, result.chain, frame->timestamp_ns);
+            auto aid = aid_at(result.flight, result.chain, frame->timestamp_ns);
+            if (job.config.tracking.fuse_navigation) aid.autopilot = autopilot.until(frame->timestamp_ns);
             result.estimates.push_back(estimator.process(*frame, aid));
             result.frame_names.push_back(frame->name);
             job.frame_done();

@@ -147,7 +147,8 @@ TEST_F(Filter, RefusesAnOutlier) {
 
 TEST_F(Filter, BelievesWhatIsWithinTheGateAndNothingBeyond) {
   follow(motion_);
-  const auto predicted = filter_.predict(now_ + kFrame);
+  // What a lively body may do is believed, however calm this one was.
+  const auto predicted = filter_.predict_widely(now_ + kFrame);
   const double sigma = std::sqrt(predicted->covariance(0, 0) + kSigma * kSigma);
   const double gate = std::sqrt(options_.gate) * sigma;
   for (const double part : {0.99, 1.01}) {
@@ -210,7 +211,7 @@ TEST_F(Filter, RecoversFromBeingLostAtTheNextMeasurement) {
 
 TEST_F(Filter, StartsAnewWhenTheClockGoesBack) {
   follow(motion_);
-  EXPECT_FALSE(filter_.predict(now_ - 1));
+  EXPECT_FALSE(filter_.predict(now_ - kSecond));
   const auto state = filter_.update(now_ - kSecond, measured(motion_.start));
   EXPECT_EQ(state->timestamp_ns, now_ - kSecond);
   EXPECT_EQ(state->source, StateSource::kVision);
@@ -297,6 +298,37 @@ TEST_F(Filter, CovarianceIsSymmetricAndPositiveAfterTenThousandSteps) {
     const Eigen::LLT<Eigen::Matrix<double, 12, 12>> llt(correlation);
     ASSERT_EQ(llt.info(), Eigen::Success) << i;
   }
+}
+
+TEST_F(Filter, ExpectsMoreOfALivelyBodyThanOfTheCalmOneItSees) {
+  follow(motion_);
+  const auto calm = filter_.predict(now_ + kFrame), lively = filter_.predict_widely(now_ + kFrame);
+  // The velocity's variance goes with the noise's density to the power of 3/2: 0.3^1.5 = 0.16.
+  EXPECT_LT(calm->covariance(6, 6), 0.25 * lively->covariance(6, 6));
+  // A wrong velocity at the start takes the calm one longer, but nothing is left of it.
+  EXPECT_THAT(calm->pad_from_body, IsNearPose(lively->pad_from_body, 1e-6, 1e-6));
+}
+
+TEST_F(Filter, BelievesALivelyBodyAtOnce) {
+  follow(motion_);
+  // WHEN the body, calm until now, brakes with 3 m/s^2 in every axis
+  const Motion before = motion_;
+  Rigid3 seen;
+  for (int i = 1; i <= 15; ++i) {
+    seen = before.at(now_ + kFrame);
+    const double s = i / 30.0;
+    seen.translation -= Eigen::Vector3d::Constant(3 * s * s / 2);
+    const auto state = see(seen);
+    EXPECT_EQ(state->source, StateSource::kVision) << i;
+    // Late by some (sigma^2 dt / q^2)^(1/4) = 0.04 s of the acceleration, and half a second of which it was
+    // sure that there is none.
+    EXPECT_LE((state->body_velocity_in_pad - (before.velocity - Eigen::Vector3d::Constant(3 * s))).norm(),
+              0.8);
+  }
+  // THEN it follows.
+  EXPECT_LE((filter_.predict(now_)->body_velocity_in_pad - (before.velocity - Eigen::Vector3d::Constant(1.5)))
+                .norm(),
+            0.6);
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ Estimator::Estimator(const RunConfig& config, const CameraModel& camera)
 
 std::optional<Prediction> Estimator::predict(int64_t timestamp_ns,
                                              const std::optional<HeadAngles>& angles) const {
-  const auto state = filter_.predict(timestamp_ns);
+  const auto state = filter_.predict_widely(timestamp_ns);
   if (!state) return std::nullopt;
   return Prediction{camera_from_target_of(
       frames_, {state->pad_from_body, state->covariance.topLeftCorner<6, 6>()}, angles)};
@@ -135,6 +135,7 @@ Estimate Estimator::process(const Frame& frame, const Aid& aid) {
   estimate.timestamp_ns = frame.timestamp_ns;
   std::vector<StageTime> total;
   Stopwatch whole(total);
+  for (const AutopilotSample& sample : aid.autopilot) filter_.hear(sample);
   estimate_pose(frame, aid, estimate);
   Stopwatch stopwatch(estimate.stages);
   estimate.state = filter_.update(frame.timestamp_ns, estimate.pad_from_body);

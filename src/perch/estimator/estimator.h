@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "perch/camera/camera_model.h"
 #include "perch/camera/image_source.h"
@@ -24,10 +25,12 @@ class Estimator {
   Estimator(const RunConfig& config, const CameraModel& camera);
 
   // What is known besides the picture at the frame's time: the angles of the pan/tilt head, and the attitude
-  // (the rotation of world_from_body), by which gravity decides what the picture of a plane cannot.
+  // (the rotation of world_from_body), by which gravity decides what the picture of a plane cannot. And all
+  // that the autopilot said since the last frame, in any order, for the filter.
   struct Aid {
     std::optional<HeadAngles> angles;
     std::optional<Eigen::Quaterniond> world_from_body;
+    std::vector<AutopilotSample> autopilot;
   };
   Estimate process(const Frame& frame, const Aid& aid = {});
 

@@ -1,17 +1,22 @@
 #include "perch/tracking/filter.h"
 
 #include <Eigen/Cholesky>
-
-#include "perch/geometry/so3.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
 
 namespace perch {
 namespace {
 
-using Matrix12d = Eigen::Matrix<double, 12, 12>;
-
 // Of times in order. Unsigned: the difference of two times from a broken file may be too large for int64_t.
 double seconds(int64_t from_ns, int64_t to_ns) {
   return static_cast<double>(static_cast<uint64_t>(to_ns) - static_cast<uint64_t>(from_ns)) * 1e-9;
+}
+
+// Whether `earlier` is before `later` by more than `most` s.
+bool is_long_before(int64_t earlier_ns, int64_t later_ns, double most) {
+  return earlier_ns < later_ns && seconds(earlier_ns, later_ns) > most;
 }
 
 // Finite, and a covariance that is one. Anything else would stay in the state for ever.
@@ -20,123 +25,165 @@ bool is_usable(const UncertainRigid3& pose) {
          pose.covariance.allFinite() && Eigen::LDLT<PoseCovariance>(pose.covariance).isPositive();
 }
 
-// Both halves of what rounding has made of them: over thousands of steps they would drift apart.
-void make_symmetric(Matrix12d& P) { P = (0.5 * (P + P.transpose())).eval(); }
-
-// White acceleration of density q^2 over dt, on a position-like (row 0) and a velocity-like (row 6) state.
-void add_noise(Matrix12d& P, Eigen::Index at, double q, double dt) {
-  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity() * q * q;
-  P.block<3, 3>(at, at) += I * (dt * dt * dt / 3);
-  P.block<3, 3>(at, at + 6) += I * (dt * dt / 2);
-  P.block<3, 3>(at + 6, at) += I * (dt * dt / 2);
-  P.block<3, 3>(at + 6, at + 6) += I * dt;
+// Without the parts that are not numbers.
+AutopilotSample usable_part(AutopilotSample sample) {
+  const auto is_sigma = [](double sigma) { return sigma > 0 && std::isfinite(sigma); };
+  auto& [time, attitude, velocity, rate, attitude_sigma, velocity_sigma, rate_sigma] = sample;
+  // A quaternion far from length 1 is none; the wire's are off by its float's rounding.
+  if (attitude && !(std::abs(attitude->norm() - 1) < 1e-2 && is_sigma(attitude_sigma))) attitude.reset();
+  if (attitude) attitude->normalize();
+  if (velocity && !(velocity->allFinite() && is_sigma(velocity_sigma))) velocity.reset();
+  if (rate && !(rate->allFinite() && is_sigma(rate_sigma))) rate.reset();
+  return sample;
 }
 
-VehicleState propagate(const VehicleState& state, int64_t timestamp_ns, const TrackingOptions& options) {
-  const double dt = seconds(state.timestamp_ns, timestamp_ns);
-  VehicleState next = state;
-  next.timestamp_ns = timestamp_ns;
-  const Eigen::Vector3d turned = state.body_angular_velocity_in_pad * dt;
-  const Eigen::Quaterniond turn = so3_exp(turned);
-  next.pad_from_body.translation += state.body_velocity_in_pad * dt;
-  next.pad_from_body.rotation = (turn * state.pad_from_body.rotation).normalized();
-  // Exp(r') = Exp((w + dw) dt) Exp(r) Exp(-w dt).
-  Matrix12d F = Matrix12d::Identity();
-  F.block<3, 3>(0, 6) = Eigen::Matrix3d::Identity() * dt;
-  F.block<3, 3>(3, 3) = turn.toRotationMatrix();
-  F.block<3, 3>(3, 9) = so3_left_jacobian(turned) * dt;
-  next.covariance = F * state.covariance * F.transpose();
-  add_noise(next.covariance, 0, options.acceleration_noise, dt);
-  add_noise(next.covariance, 3, options.angular_acceleration_noise, dt);
-  make_symmetric(next.covariance);
-  return next;
+// Events of one time have an order too, so that it does not matter in which they come: what the autopilot
+// says before what the frame shows.
+int rank(bool is_pose, const AutopilotSample& sample) {
+  if (is_pose) return 8;
+  return (sample.world_from_body ? 0 : 4) + (sample.body_velocity_in_world ? 0 : 2) +
+         (sample.angular_velocity_in_body ? 0 : 1);
+}
+
+constexpr double kCalm = 0.3;  // of the lively body's noise
+
+MotionBank make_bank(const TrackingOptions& o) {
+  const BodyNoise lively{o.acceleration_noise, o.angular_acceleration_noise};
+  const BodyNoise calm{kCalm * lively.acceleration, kCalm * lively.angular_acceleration};
+  // Attitudes of an autopilot wander by half a degree in half a minute. A velocity in the world drifts, as
+  // satellites move: 0.2 m/s is much. Neither is the pad's, but that cannot be told.
+  constexpr double kWander = 0.002;
+  const PadNoise moving{o.pad_acceleration_noise, o.pad_angular_acceleration_noise, kWander, 2.0, 0.2};
+  const PadNoise standing{0.01, 0, kWander, 0.2, 1e-4};
+  return {{lively, calm}, {moving, standing}};
+}
+
+VehicleState state_of(const Motion& motion, int64_t timestamp_ns) {
+  VehicleState state;
+  state.timestamp_ns = timestamp_ns;
+  state.pad_from_body = motion.pad_from_body;
+  state.body_velocity_in_pad = motion.velocity;
+  state.body_angular_velocity_in_pad = motion.angular_velocity;
+  state.covariance = motion.P.topLeftCorner<12, 12>();
+  state.source = StateSource::kPredicted;
+  return state;
 }
 
 }  // namespace
 
-TrackingOptions read_tracking_options(Section tracking) {
-  TrackingOptions o;
-  tracking.read("acceleration_noise", o.acceleration_noise, kPositive);
-  tracking.read("angular_acceleration_noise", o.angular_acceleration_noise, kPositive);
-  tracking.read("gate", o.gate, kPositive);
-  tracking.read("restart_after", o.restart_after, Range{1, 1000});
-  tracking.read("coast", o.coast, kNotNegative);
-  tracking.read("initial_velocity_sigma", o.initial_velocity_sigma, kPositive);
-  tracking.read("initial_angular_velocity_sigma", o.initial_angular_velocity_sigma, kPositive);
-  tracking.done();
-  return o;
+VehicleFilter::Known::Known(const TrackingOptions& options) : bank(make_bank(options)) {}
+
+VehicleFilter::VehicleFilter(const TrackingOptions& options) : options_(options), base_(options) {}
+
+// Also not at times before those that the history still has.
+bool VehicleFilter::is_tracking(const Known& known, int64_t timestamp_ns) const {
+  return known.tracking && known.timestamp_ns <= timestamp_ns &&
+         !is_long_before(known.last_measured_ns, timestamp_ns, options_.coast);
 }
 
-void VehicleFilter::start(int64_t timestamp_ns, const UncertainRigid3& pad_from_body) {
-  VehicleState state;
-  state.timestamp_ns = timestamp_ns;
-  state.pad_from_body = pad_from_body.mean;
-  state.covariance.topLeftCorner<6, 6>() = pad_from_body.covariance;
-  const double v = options_.initial_velocity_sigma, w = options_.initial_angular_velocity_sigma;
-  state.covariance.diagonal().segment<3>(6).setConstant(v * v);
-  state.covariance.diagonal().segment<3>(9).setConstant(w * w);
-  state.source = StateSource::kVision;
-  state_ = state;
-  last_measured_ns_ = timestamp_ns;
-  refused_ = 0;
+VehicleFilter::Known VehicleFilter::after(const Known& before, const Event& event) const {
+  Known known = before;
+  known.believed = false;
+  const bool tracking = is_tracking(before, event.timestamp_ns);
+  if (tracking) {
+    known.bank.propagate(seconds(before.timestamp_ns, event.timestamp_ns));
+    known.timestamp_ns = event.timestamp_ns;
+  }
+  if (!event.pad_from_body) {
+    if (tracking) known.bank.hear(event.sample, options_.gate, options_.restart_after);
+    return known;
+  }
+  if (tracking) {
+    known.believed = known.bank.see(*event.pad_from_body, options_.gate);
+    known.refused = known.believed ? 0 : known.refused + 1;
+  }
+  if (!tracking || known.refused >= options_.restart_after) {
+    known.bank.start(
+        {*event.pad_from_body, options_.initial_velocity_sigma, options_.initial_angular_velocity_sigma});
+    known.tracking = known.believed = true;
+    known.timestamp_ns = event.timestamp_ns;
+    known.refused = 0;
+  }
+  if (known.believed) known.last_measured_ns = event.timestamp_ns;
+  return known;
 }
 
-bool VehicleFilter::correct(const UncertainRigid3& pad_from_body) {
-  const PoseError innovation = pose_error(state_->pad_from_body, pad_from_body.mean);
-  Matrix12d& P = state_->covariance;
-  const PoseCovariance S = P.topLeftCorner<6, 6>() + pad_from_body.covariance;
-  const Eigen::LLT<PoseCovariance> llt(S);
-  // A NaN fails both.
-  if (llt.info() != Eigen::Success || !(innovation.dot(llt.solve(innovation)) <= options_.gate)) return false;
-  const Eigen::Matrix<double, 12, 6> K = llt.solve(P.topRows<6>()).transpose();
-  const Eigen::Matrix<double, 12, 1> step = K * innovation;
-  state_->pad_from_body = perturb(state_->pad_from_body, step.head<6>());
-  state_->body_velocity_in_pad += step.segment<3>(6);
-  state_->body_angular_velocity_in_pad += step.tail<3>();
-  // Joseph's form: stays positive whatever the rounding.
-  Matrix12d A = Matrix12d::Identity();
-  A.leftCols<6>() -= K;
-  P = (A * P * A.transpose() + K * pad_from_body.covariance * K.transpose()).eval();
-  make_symmetric(P);
-  return true;
+void VehicleFilter::insert(const Event& event) {
+  const auto order = [](const Event& e) {
+    return std::pair(e.timestamp_ns, rank(e.pad_from_body.has_value(), e.sample));
+  };
+  const auto place = std::lower_bound(history_.begin(), history_.end(), order(event),
+                                      [&](const Entry& a, const auto& b) { return order(a.event) < b; });
+  // The same once more: counted again, its noise would seem to average out.
+  if (place != history_.end() && order(place->event) == order(event)) return;
+  auto entry = history_.insert(place, Entry{event, base_});
+  for (; entry != history_.end(); ++entry) {
+    entry->after = after(entry == history_.begin() ? base_ : std::prev(entry)->after, entry->event);
+  }
+}
+
+void VehicleFilter::forget_before(int64_t timestamp_ns) {
+  while (!history_.empty() && history_.front().event.timestamp_ns < timestamp_ns) {
+    base_ = std::move(history_.front().after);
+    history_.pop_front();
+  }
+}
+
+// After the last event up to then.
+const VehicleFilter::Known& VehicleFilter::known_at(int64_t timestamp_ns) const {
+  const auto next =
+      std::upper_bound(history_.begin(), history_.end(), timestamp_ns,
+                       [](int64_t time, const Entry& entry) { return time < entry.event.timestamp_ns; });
+  return next == history_.begin() ? base_ : std::prev(next)->after;
 }
 
 std::optional<VehicleState> VehicleFilter::predict(int64_t timestamp_ns) const {
-  if (!state_ || state_->source == StateSource::kLost || timestamp_ns < state_->timestamp_ns ||
-      seconds(last_measured_ns_, timestamp_ns) > options_.coast) {
-    return std::nullopt;
+  const Known& known = known_at(timestamp_ns);
+  if (!is_tracking(known, timestamp_ns)) return std::nullopt;
+  return state_of(known.bank.predicted(seconds(known.timestamp_ns, timestamp_ns)), timestamp_ns);
+}
+
+std::optional<VehicleState> VehicleFilter::predict_widely(int64_t timestamp_ns) const {
+  const Known& known = known_at(timestamp_ns);
+  if (!is_tracking(known, timestamp_ns)) return std::nullopt;
+  return state_of(known.bank.predicted_by_first(seconds(known.timestamp_ns, timestamp_ns)), timestamp_ns);
+}
+
+void VehicleFilter::hear(const AutopilotSample& sample) {
+  constexpr double kAhead = 1.0;  // s: cameras stall and frames are worked on, but not for that long
+  const int64_t t = sample.timestamp_ns;
+  if (!last_frame_ns_ || is_long_before(t, *last_frame_ns_, options_.history) ||
+      is_long_before(*last_frame_ns_, t, kAhead)) {
+    return;
   }
-  VehicleState next = propagate(*state_, timestamp_ns, options_);
-  next.source = StateSource::kPredicted;
-  return next;
+  const AutopilotSample usable = usable_part(sample);
+  if (usable.world_from_body || usable.body_velocity_in_world || usable.angular_velocity_in_body) {
+    insert({t, std::nullopt, usable});
+  }
 }
 
 std::optional<VehicleState> VehicleFilter::update(int64_t timestamp_ns,
                                                   const std::optional<UncertainRigid3>& pad_from_body) {
-  // The same frame twice: counted again, its noise would seem to average out.
-  if (state_ && state_->source == StateSource::kVision && state_->timestamp_ns == timestamp_ns) return state_;
-  const bool measured = pad_from_body && is_usable(*pad_from_body);
-  const auto predicted = predict(timestamp_ns);
-  if (!predicted) {
-    // Not yet tracking, lost, or a clock that went back.
-    if (measured) {
-      start(timestamp_ns, *pad_from_body);
-    } else if (state_) {
-      state_->timestamp_ns = timestamp_ns;
-      state_->source = StateSource::kLost;
-    }
-    return state_;
+  if (last_frame_ns_ && is_long_before(timestamp_ns, *last_frame_ns_, options_.history)) {
+    history_.clear();
+    base_ = Known(options_);
+    last_frame_ns_.reset();
   }
-  state_ = predicted;
-  if (!measured) return state_;
-  if (correct(*pad_from_body)) {
-    state_->source = StateSource::kVision;
-    last_measured_ns_ = timestamp_ns;
-    refused_ = 0;
-  } else if (++refused_ >= options_.restart_after) {
-    start(timestamp_ns, *pad_from_body);
+  last_frame_ns_ = std::max(timestamp_ns, last_frame_ns_.value_or(timestamp_ns));
+  if (pad_from_body && is_usable(*pad_from_body)) insert({timestamp_ns, pad_from_body, {}});
+  if (const auto state = predict(timestamp_ns)) {
+    last_state_ = state;
+    const Known& known = known_at(timestamp_ns);
+    if (known.believed && known.timestamp_ns == timestamp_ns) last_state_->source = StateSource::kVision;
+  } else if (last_state_) {
+    last_state_->timestamp_ns = timestamp_ns;
+    last_state_->source = StateSource::kLost;
   }
-  return state_;
+  const auto history_ns = static_cast<int64_t>(options_.history * 1e9);
+  if (*last_frame_ns_ > std::numeric_limits<int64_t>::min() + history_ns) {
+    forget_before(*last_frame_ns_ - history_ns);
+  }
+  return last_state_;
 }
 
 }  // namespace perch

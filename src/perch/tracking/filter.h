@@ -1,60 +1,82 @@
 #pragma once
 
+#include <deque>
 #include <optional>
 
-#include "perch/config/section.h"
 #include "perch/geometry/uncertainty.h"
+#include "perch/tracking/autopilot_sample.h"
+#include "perch/tracking/motion_bank.h"
+#include "perch/tracking/tracking_options.h"
 #include "perch/tracking/vehicle_state.h"
 
 namespace perch {
 
-struct TrackingOptions {
-  // White noise on acceleration: a small UAV's manoeuvres of 1 m/s^2 that last about a second.
-  double acceleration_noise = 1.0;          // m/s^2/sqrt(Hz)
-  double angular_acceleration_noise = 2.0;  // rad/s^2/sqrt(Hz)
-  // Innovations above this chi-square (6 degrees of freedom) are not believed: one honest measurement in
-  // 10,000.
-  double gate = 27.9;
-  // So many refused in a row, and it is the filter that is wrong: it starts anew from the last.
-  int restart_after = 5;
-  // Without a measurement the state is predicted for this long, then lost.
-  double coast = 1.0;  // s
-  // What is known of the motion when tracking starts.
-  double initial_velocity_sigma = 3.0;          // m/s
-  double initial_angular_velocity_sigma = 1.0;  // rad/s
-};
-
-// Reads the section and refuses unknown keys.
-TrackingOptions read_tracking_options(Section tracking);
-
-// The vehicle's pose and velocity in the pad frame: an error-state Kalman filter with constant velocity.
+// The vehicle's pose and velocity in the pad frame: error-state Kalman filters with constant velocity
+// (Motion, several at a time: MotionBank), fed by the poses of the frames and by what the autopilot says.
 //
-//   p' = p + v dt,  R' = Exp(w dt) R,  v and w random walks.   State error (d, r, dv, dw) as in VehicleState.
+//            first measured pose                      none for `coast` seconds
+//   (none) ----------------------> vision <--> predicted ----------------------> lost --measured pose-->
+//   vision
 //
-//            first measurement                      none for `coast` seconds
-//   (none) --------------------> vision <--> predicted ------------------------> lost --measurement--> vision
+// Every measurement is taken at its own time, in whatever order they come: those of the last `history`
+// seconds are kept with the state after each, and a late one is put in its place and the rest done again. The
+// state at a time is that of all measurements up to it; so the result is the same, to the last bit, as if all
+// had come in order.
 class VehicleFilter {
  public:
-  explicit VehicleFilter(const TrackingOptions& options) : options_(options) {}
+  explicit VehicleFilter(const TrackingOptions& options);
 
-  // The state at a frame's time, with the measurement of that frame where there is one. Empty before the
-  // first measurement. Times must not go back: an earlier time than the last starts anew. A second
-  // measurement of the same time changes nothing. One that is not finite, or whose covariance is none, counts
-  // as no measurement.
+  // The state at a frame's time, with the pose measured in that frame where there is one. Empty before the
+  // first measured pose. A time earlier than the last frame's by more than the history is a clock that went
+  // back: tracking starts anew. A second pose of the same time changes nothing. One that is not finite, or
+  // whose covariance is none, counts as none.
   std::optional<VehicleState> update(int64_t timestamp_ns,
                                      const std::optional<UncertainRigid3>& pad_from_body);
 
-  // Where the body will be, without changing anything; empty when not tracking.
+  // What the autopilot says; ignored where it is not finite, too late, or more than a second ahead of the
+  // last frame (another clock). Only known motion can be helped: it never starts tracking, nor prolongs it.
+  void hear(const AutopilotSample& sample);
+
+  // Where the body is or will be, without changing anything; empty when not tracking, and for times that the
+  // history does not reach.
   std::optional<VehicleState> predict(int64_t timestamp_ns) const;
 
+  // The same with a covariance that allows for all a lively body could do, however calm it was of late: where
+  // to look for the pad, and how far to trust what is expected against what is seen.
+  std::optional<VehicleState> predict_widely(int64_t timestamp_ns) const;
+
  private:
-  void start(int64_t timestamp_ns, const UncertainRigid3& pad_from_body);
-  bool correct(const UncertainRigid3& pad_from_body);
+  struct Event {
+    int64_t timestamp_ns = 0;
+    std::optional<UncertainRigid3> pad_from_body;  // else:
+    AutopilotSample sample;
+  };
+  // All that is known after an event.
+  struct Known {
+    explicit Known(const TrackingOptions& options);
+    bool tracking = false;
+    bool believed = false;  // the pose, when the event was one
+    int64_t timestamp_ns = 0;
+    int64_t last_measured_ns = 0;
+    int refused = 0;  // measured poses in a row
+    MotionBank bank;
+  };
+  struct Entry {
+    Event event;
+    Known after;
+  };
+
+  bool is_tracking(const Known& known, int64_t timestamp_ns) const;
+  Known after(const Known& before, const Event& event) const;
+  void insert(const Event& event);
+  void forget_before(int64_t timestamp_ns);
+  const Known& known_at(int64_t timestamp_ns) const;
 
   TrackingOptions options_;
-  std::optional<VehicleState> state_;
-  int64_t last_measured_ns_ = 0;
-  int refused_ = 0;  // measurements in a row
+  Known base_;  // before the first entry
+  std::deque<Entry> history_;
+  std::optional<int64_t> last_frame_ns_;
+  std::optional<VehicleState> last_state_;
 };
 
 }  // namespace perch

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "perch/tracking/motion.h"
+
+namespace perch {
+
+// How lively the body and the pad are, nobody knows beforehand: a hover in still air and a landing in gusts,
+// a lawn and a ship's deck. So several filters run side by side, one for each pair of a body's and a pad's
+// noise, and the most likely one speaks (multiple model adaptive estimation, Magill 1965, with forgetting):
+//
+//   L_i' = -L_i / memory,   L_i += log N(y; 0, S_i) at each measurement,
+//
+// where another one takes over only when it leads clearly, so that the choice does not flutter. One that is
+// surprised beyond the gate by what another one expected is wrong, and goes on from that other one's state.
+class MotionBank {
+ public:
+  // The first of each speak first. Before the world is known pads make no difference, and there is one filter
+  // for each body only.
+  MotionBank(std::vector<BodyNoise> bodies, std::vector<PadNoise> pads);
+
+  void start(const Motion& motion);
+  void propagate(double dt);
+  // A measured pose: whether any filter believed it, its innovation squared within the gate (chi-square, 6
+  // degrees of freedom). What none believes changes nothing.
+  bool see(const UncertainRigid3& pad_from_body, double gate);
+  // A sample of the autopilot, each part gated for itself. After `patience` refusals in a row the world is
+  // not what it was (the autopilot's heading was reset, say), and is met anew a second later: an autopilot that
+  // makes no sense is not listened to at each of its words.
+  void hear(const AutopilotSample& sample, double gate, int patience);
+
+  // The speaker's, now and after dt.
+  const Motion& motion() const { return members_[speaker_].motion; }
+  Motion predicted(double dt) const { return members_[speaker_].predicted(dt); }
+  // By the first hypothesis, whoever speaks.
+  Motion predicted_by_first(double dt) const { return members_.front().predicted(dt); }
+
+ private:
+  struct Member {
+    BodyNoise body;
+    PadNoise pad;
+    Motion motion;
+    double log_likelihood = 0;  // less that of the best
+
+    Motion predicted(double dt) const;
+  };
+  template <typename InnovationOf>
+  bool take(const InnovationOf& innovation_of, double gate);
+  void choose();
+  void meet_world(const AutopilotSample& sample);
+  void forget_world();
+
+  std::vector<BodyNoise> bodies_;
+  std::vector<PadNoise> pads_;
+  std::vector<Member> members_;
+  size_t speaker_ = 0;
+  double deaf_ = 0;               // s, still
+  std::array<int, 3> refused_{};  // attitudes, velocities and angular velocities, in a row
+};
+
+}  // namespace perch

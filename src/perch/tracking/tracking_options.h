@@ -1,0 +1,36 @@
+#pragma once
+
+#include "perch/config/section.h"
+
+namespace perch {
+
+struct TrackingOptions {
+  // White noise on the acceleration of a lively body: manoeuvres of 1 m/s^2 that last about a second. A calm
+  // one, a third of it, is tried beside it; the more likely of the two speaks.
+  double acceleration_noise = 1.0;          // m/s^2/sqrt(Hz)
+  double angular_acceleration_noise = 2.0;  // rad/s^2/sqrt(Hz)
+  // Of a pad that moves, tried beside one that stands still: a small ship in sea state 4 heaves with 0.3
+  // m/s^2 and rolls with 0.04 rad/s^2 (deviations), for one or two seconds to each side.
+  double pad_acceleration_noise = 0.5;
+  double pad_angular_acceleration_noise = 0.06;
+  // Innovations above this chi-square (6 degrees of freedom) are not believed: one honest measurement in
+  // 10,000.
+  double gate = 27.9;
+  // So many refused in a row, and it is the filter that is wrong: it starts anew from the last.
+  int restart_after = 5;
+  // Without a measured pose the state is predicted for this long, then lost.
+  double coast = 1.0;  // s
+  // Measurements that come late are taken at their own time when it is no longer ago than this.
+  double history = 0.5;  // s
+  // perch-batch only: what the flight's navigation says of attitude and velocity is fused too, as a live run
+  // does. Not by default: a score against that same navigation would then be one of itself in part.
+  bool fuse_navigation = false;
+  // What is known of the motion when tracking starts.
+  double initial_velocity_sigma = 3.0;          // m/s
+  double initial_angular_velocity_sigma = 1.0;  // rad/s
+};
+
+// Reads the section and refuses unknown keys.
+TrackingOptions read_tracking_options(Section tracking);
+
+}  // namespace perch
