@@ -156,6 +156,56 @@ TEST_F(SimulationFiles, TruthAgreesWithItsParts) {
   }
 }
 
+TEST_F(SimulationFiles, OnADeckEveryTruthSeesThePadMove) {
+  Simulation simulation = small();
+  simulation.deck.emplace();
+  const SimulatedFlight flight(simulation), ashore(small());
+  write(flight, "flight");
+  const fs::path mav = folder_ / "flight" / "mav0";
+  const auto poses = rows(mav / "cam0" / "truth_target_pose.csv");
+  const auto states = rows(mav / "state_groundtruth_estimate0" / "data.csv");
+  const auto pads = rows(mav / "pad0" / "data.csv");
+  const auto bodies = rows(mav / "truth_pad_from_body.csv");
+  ASSERT_EQ(pads.size(), 8u);
+  ASSERT_EQ(bodies.size(), 8u);
+  for (size_t i = 0; i < pads.size(); ++i) {
+    const auto frame = static_cast<int64_t>(i);
+    const Rigid3 body = inverse(pose(pads[i])) * pose(states[i]);
+    EXPECT_THAT(pose(bodies[i]), IsNearPose(body, 1e-12, 1e-12));
+    EXPECT_THAT(pose(poses[i]), IsNearPose(inverse(body * simulation.body_from_camera), 1e-12, 1e-12));
+    // The vehicle does what it does ashore.
+    EXPECT_THAT(pose(states[i]), IsNearPose(ashore.vehicle(frame).world_from_body, 1e-12, 1e-12));
+    EXPECT_GT((pose(pads[i]).translation - simulation.world_from_pad.translation).norm(), 1e-3);
+  }
+  // Navigation has no place of the pad to be compared with.
+  Section run = Section::load(folder_ / "flight" / "perch.yaml");
+  EXPECT_FALSE(run.section("frames").has("world_from_pad"));
+}
+
+TEST_F(SimulationFiles, VelocityOverTheDeckIsHowThePlaceOverItChanges) {
+  Simulation simulation = small();
+  simulation.rate_hz = 100;
+  simulation.deck.emplace();
+  const SimulatedFlight flight(simulation);
+  for (int64_t i = 1; i + 1 < flight.frames(); ++i) {
+    const Eigen::Vector3d step =
+        (flight.pad_from_body(i + 1).translation - flight.pad_from_body(i - 1).translation) / 0.02;
+    // A central difference is off by T^2 / 6 of the third derivative: of this steep descent of 9 m/s some
+    // 700 m/s^3, 0.012 m/s; a term left out, of the deck's 0.3 m/s or of its turning, would be more.
+    EXPECT_LE((flight.body_velocity_in_pad(i) - step).norm(), 0.012) << i;
+  }
+}
+
+TEST_F(SimulationFiles, ADeckIsThereWhenItIsNamed) {
+  EXPECT_FALSE(read_simulation(section()).deck);
+  const auto deck = read_simulation(section("deck: {heave: 1.5, roll_deg: 7}\n")).deck;
+  ASSERT_TRUE(deck);
+  EXPECT_EQ(deck->heave, 1.5);
+  EXPECT_NEAR(deck->roll, 7 * M_PI / 180, 4 * kEpsilon);
+  EXPECT_EQ(deck->pitch, DeckOptions{}.pitch);
+  EXPECT_THROW(read_simulation(section("deck: {height: 1}\n")), ConfigError);
+}
+
 TEST_F(SimulationFiles, WritesAWholeFlight) {
   const SimulatedFlight flight(small("LENSMODEL_OPENCV5", ", -0.1, 0.01, 0, 0, 0"));
   write(flight, "flight");

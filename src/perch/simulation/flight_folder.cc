@@ -92,12 +92,15 @@ std::string pose_yaml(const Rigid3& pose) {
 
 // What perch-batch needs to score this flight: everything as it really was.
 std::string perch_yaml(const Simulation& simulation) {
+  // A deck that moves is nowhere in the world for long: navigation has nothing to compare with then.
+  const std::string pad = simulation.deck
+                              ? "  # no world_from_pad: the pad moves, see mav0/pad0\n"
+                              : "  world_from_pad: " + pose_yaml(simulation.world_from_pad) + "\n";
   return "# For perch-batch --config perch.yaml: the frames as they were simulated.\ntarget: "
          "target.yaml\nframes:\n"
          "  base_from_camera: identity\n  body_from_base: " +
-         pose_yaml(simulation.body_from_camera) +
-         "\n  target_from_pad: identity\n  world_from_pad: " + pose_yaml(simulation.world_from_pad) +
-         format("\n  time_offset: %.17g\n", simulation.nav.time_offset);
+         pose_yaml(simulation.body_from_camera) + "\n  target_from_pad: identity\n" + pad +
+         format("  time_offset: %.17g\n", simulation.nav.time_offset);
 }
 
 std::string frame_name(const SimulatedFlight& flight, int64_t frame) {
@@ -137,6 +140,25 @@ void FlightFolder::write_frame(const SimulatedFlight& flight, int64_t frame) con
   }
 }
 
+// How the vehicle and, on a deck, the pad really moved.
+void FlightFolder::write_motions(const SimulatedFlight& flight) const {
+  const std::string columns =
+      "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z,v_x [m/s],v_y [m/s],v_z [m/s]";
+  std::string body = columns + "\n", pad = columns + ",w_x [rad/s],w_y [rad/s],w_z [rad/s]\n";
+  for (int64_t i = 0; i < flight.frames(); ++i) {
+    const std::string time = format("%" PRId64 ",", flight.timestamp_ns(i));
+    body += time + point_and_quaternion(flight.pad_from_body(i)) + "," +
+            velocity(flight.body_velocity_in_pad(i)) + "\n";
+    const PadTruth truth = flight.pad(i);
+    pad += time + point_and_quaternion(truth.world_from_pad) + "," + velocity(truth.pad_velocity_in_world) +
+           "," + velocity(truth.angular_velocity_in_pad) + "\n";
+  }
+  write(part_ / "mav0" / "truth_pad_from_body.csv", body);
+  if (!flight.simulation().deck) return;
+  fs::create_directories(part_ / "mav0" / "pad0");
+  write(part_ / "mav0" / "pad0" / "data.csv", pad);
+}
+
 void FlightFolder::write_tables(const SimulatedFlight& flight,
                                 const std::string& resolved_configuration) const {
   const Simulation& simulation = flight.simulation();
@@ -165,6 +187,7 @@ void FlightFolder::write_tables(const SimulatedFlight& flight,
   write(mav / "cam0" / "truth_target_pose.csv", poses);
   write(mav / "state_groundtruth_estimate0" / "data.csv", states);
   write(mav / "nav0" / "data.csv", nav);
+  write_motions(flight);
   write(mav / "cam0" / "sensor.yaml", sensor_yaml(simulation));
   if (simulation.camera.lens() != "LENSMODEL_PINHOLE" && simulation.camera.lens() != "LENSMODEL_OPENCV4") {
     write(mav / "cam0" / "camera.cameramodel", camera_model(simulation.camera));

@@ -14,6 +14,7 @@ namespace perch {
 //     simulation.yaml       the configuration as resolved, and the mark by which a folder is known as ours
 //     perch.yaml            a configuration for perch-batch with the true frames; target.yaml beside it
 //     mav0/cam0, nav0, state_groundtruth_estimate0    and cam0/truth_target_pose.csv
+//     mav0/truth_pad_from_body.csv, and pad0 when the pad is on a deck
 class FlightFolder {
  public:
   // Throws std::runtime_error when `folder` holds anything and is not a simulated flight with `force` given.
@@ -28,6 +29,8 @@ class FlightFolder {
   void finish();
 
  private:
+  void write_motions(const SimulatedFlight& flight) const;
+
   std::filesystem::path folder_, part_;
 };
 

@@ -66,6 +66,16 @@ void read_flight_options(Section flight, Simulation& simulation) {
   flight.done();
 }
 
+void read_deck(Section deck, DeckOptions& o) {
+  deck.read("heave", o.heave, Range{0, 10});
+  deck.read("sway", o.sway, Range{0, 10});
+  read_deg(deck, "roll_deg", o.roll, Range{0, 45});
+  read_deg(deck, "pitch_deg", o.pitch, Range{0, 45});
+  deck.read("period", o.period, Range{1, 60});
+  deck.read("roll_period", o.roll_period, Range{1, 60});
+  deck.done();
+}
+
 void read_scene(Section scene, SceneOptions& o) {
   scene.read("white", o.white, kFraction);
   scene.read("black", o.black, kFraction);
@@ -121,6 +131,10 @@ Simulation read_simulation(Section root) {
   simulation.target = read_target(simulation.target_file);
   read_camera(root.section("camera"), simulation);
   read_flight_options(root.section("flight"), simulation);
+  if (root.has("deck")) {
+    simulation.deck.emplace();
+    read_deck(root.section("deck"), *simulation.deck);
+  }
   read_scene(root.section("scene"), simulation.picture.scene);
   read_sensor(root.section("sensor"), simulation.picture.sensor);
   read_nav(root.section("nav"), simulation.nav);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int64_t kStartNs = 1700000000000000000;  // a date like any other
 // Numbers of the independent random streams of one seed.
-constexpr uint64_t kDescentStream = 1, kNavigationStream = 2, kPictureStream = 3;
+constexpr uint64_t kDescentStream = 1, kNavigationStream = 2, kPictureStream = 3, kDeckStream = 4;
 
 uint64_t stream_seed(uint64_t seed, uint64_t stream) { return RandomStream(seed, stream).bits(); }
 
@@ -31,6 +31,7 @@ SimulatedFlight::SimulatedFlight(const Simulation& simulation)
     : simulation_(simulation),
       descent_(simulation.flight, simulation.world_from_pad.translation,
                stream_seed(simulation.seed, kDescentStream)),
+      deck_(simulation.deck, simulation.world_from_pad, stream_seed(simulation.seed, kDeckStream)),
       renderer_(simulation.camera, simulation.target, simulation.picture.scene, simulation.picture.optics),
       sensor_(simulation.picture.sensor) {}
 
@@ -48,9 +49,23 @@ double SimulatedFlight::time(int64_t frame) const {
 
 VehicleTruth SimulatedFlight::vehicle(int64_t frame) const { return descent_.at(time(frame)); }
 
+PadTruth SimulatedFlight::pad(int64_t frame) const { return deck_.at(time(frame)); }
+
+Rigid3 SimulatedFlight::pad_from_body(int64_t frame) const {
+  return inverse(pad(frame).world_from_pad) * vehicle(frame).world_from_body;
+}
+
+// p = Q^T (P_body - P_pad): p' = Q^T (V_body - V_pad) - W x p.
+Eigen::Vector3d SimulatedFlight::body_velocity_in_pad(int64_t frame) const {
+  const PadTruth pad_truth = pad(frame);
+  const Eigen::Vector3d apart = vehicle(frame).body_velocity_in_world - pad_truth.pad_velocity_in_world;
+  return pad_truth.world_from_pad.rotation.conjugate() * apart -
+         pad_truth.angular_velocity_in_pad.cross(pad_from_body(frame).translation);
+}
+
 Rigid3 SimulatedFlight::camera_from_target_at(double time) const {
   const Rigid3 world_from_camera = descent_.at(time).world_from_body * simulation_.body_from_camera;
-  return inverse(world_from_camera) * simulation_.world_from_pad;
+  return inverse(world_from_camera) * deck_.at(time).world_from_pad;
 }
 
 Rigid3 SimulatedFlight::camera_from_target(int64_t frame) const { return camera_from_target_at(time(frame)); }

@@ -5,6 +5,7 @@
 
 #include "perch/camera/camera_model.h"
 #include "perch/config/section.h"
+#include "perch/simulation/deck.h"
 #include "perch/simulation/descent.h"
 #include "perch/simulation/navigation.h"
 #include "perch/simulation/picture.h"
@@ -23,6 +24,8 @@ struct Simulation {
   Rigid3 body_from_camera;
   // Level, face up: the pad's z is -z of NED.
   Rigid3 world_from_pad;
+  // A pad on a ship moves about that place; the flight goes to it, too, and does not follow the deck.
+  std::optional<DeckOptions> deck;
   ShutterOptions shutter;
   PictureOptions picture;
   DescentOptions flight;
@@ -32,8 +35,8 @@ struct Simulation {
   Simulation();
 };
 
-// Reads `target`, `camera`, `flight`, `scene`, `sensor`, `nav` and `seed`, refuses unknown keys. Every key
-// has a default but `target`. Throws ConfigError.
+// Reads `target`, `camera`, `flight`, `deck`, `scene`, `sensor`, `nav` and `seed`, refuses unknown keys.
+// Every key has a default but `target`. Throws ConfigError.
 Simulation read_simulation(Section root);
 
 // A simulation in flight. Const calls may run in several threads: frames depend on nothing but their number.
@@ -44,6 +47,9 @@ class SimulatedFlight {
   int64_t frames() const;
   int64_t timestamp_ns(int64_t frame) const;  // mid-exposure, camera clock
   VehicleTruth vehicle(int64_t frame) const;  // then
+  PadTruth pad(int64_t frame) const;
+  Rigid3 pad_from_body(int64_t frame) const;
+  Eigen::Vector3d body_velocity_in_pad(int64_t frame) const;  // as seen from the pad, m/s
   Rigid3 camera_from_target(int64_t frame) const;
   cv::Mat_<uint8_t> picture(int64_t frame) const;
   std::vector<NavigationReport> navigation() const;
@@ -55,6 +61,7 @@ class SimulatedFlight {
 
   Simulation simulation_;
   Descent descent_;
+  Deck deck_;
   Renderer renderer_;
   Sensor sensor_;
 };
