@@ -45,19 +45,6 @@ int rank(bool is_pose, const AutopilotSample& sample) {
          (sample.angular_velocity_in_body ? 0 : 1);
 }
 
-constexpr double kCalm = 0.3;  // of the lively body's noise
-
-MotionBank make_bank(const TrackingOptions& o) {
-  const BodyNoise lively{o.acceleration_noise, o.angular_acceleration_noise};
-  const BodyNoise calm{kCalm * lively.acceleration, kCalm * lively.angular_acceleration};
-  // Attitudes of an autopilot wander by half a degree in half a minute. A velocity in the world drifts, as
-  // satellites move: 0.2 m/s is much. Neither is the pad's, but that cannot be told.
-  constexpr double kWander = 0.002;
-  const PadNoise moving{o.pad_acceleration_noise, o.pad_angular_acceleration_noise, kWander, 2.0, 0.2};
-  const PadNoise standing{0.01, 0, kWander, 0.2, 1e-4};
-  return {{lively, calm}, {moving, standing}};
-}
-
 VehicleState state_of(const Motion& motion, int64_t timestamp_ns) {
   VehicleState state;
   state.timestamp_ns = timestamp_ns;
@@ -71,7 +58,8 @@ VehicleState state_of(const Motion& motion, int64_t timestamp_ns) {
 
 }  // namespace
 
-VehicleFilter::Known::Known(const TrackingOptions& options) : bank(make_bank(options)) {}
+VehicleFilter::Known::Known(const TrackingOptions& options)
+    : bank(body_hypotheses(options), pad_hypotheses(options)) {}
 
 VehicleFilter::VehicleFilter(const TrackingOptions& options) : options_(options), base_(options) {}
 

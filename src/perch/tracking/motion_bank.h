@@ -27,8 +27,8 @@ class MotionBank {
   // degrees of freedom). What none believes changes nothing.
   bool see(const UncertainRigid3& pad_from_body, double gate);
   // A sample of the autopilot, each part gated for itself. After `patience` refusals in a row the world is
-  // not what it was (the autopilot's heading was reset, say), and is met anew a second later: an autopilot that
-  // makes no sense is not listened to at each of its words.
+  // not what it was (the autopilot's heading was reset, say), and is met anew a second later: an autopilot
+  // that makes no sense is not listened to at each of its words.
   void hear(const AutopilotSample& sample, double gate, int patience);
 
   // The speaker's, now and after dt.

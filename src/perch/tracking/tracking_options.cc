@@ -19,4 +19,29 @@ TrackingOptions read_tracking_options(Section tracking) {
   return o;
 }
 
+std::vector<BodyNoise> body_hypotheses(const TrackingOptions& options) {
+  // The simulated descent in gusts is best told by 0.3 m/s^2/sqrt(Hz); a real hover is calmer still.
+  constexpr double kCalm = 0.3;
+  const BodyNoise lively{options.acceleration_noise, options.angular_acceleration_noise};
+  return {lively, {kCalm * lively.acceleration, kCalm * lively.angular_acceleration}};
+}
+
+std::vector<PadNoise> pad_hypotheses(const TrackingOptions& options) {
+  // Attitudes of an autopilot wander by half a degree in half a minute; its velocity drifts, as satellites
+  // move: 0.2 m/s is much. Neither is the pad's doing, but nothing tells them apart.
+  constexpr double kWander = 0.002;
+  PadNoise moving;
+  moving.acceleration = options.pad_acceleration_noise;
+  moving.angular_acceleration = options.pad_angular_acceleration_noise;
+  moving.wander = kWander;
+  moving.velocity_sigma = 2;  // before the first measurement; ships at more are found too, some samples later
+  moving.angular_velocity_sigma = 0.2;
+  PadNoise standing;
+  standing.acceleration = 0.01;
+  standing.wander = kWander;
+  standing.velocity_sigma = 0.2;
+  standing.angular_velocity_sigma = 1e-4;
+  return {moving, standing};
+}
+
 }  // namespace perch

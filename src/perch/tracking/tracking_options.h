@@ -1,6 +1,9 @@
 #pragma once
 
+#include <vector>
+
 #include "perch/config/section.h"
+#include "perch/tracking/motion.h"
 
 namespace perch {
 
@@ -32,5 +35,10 @@ struct TrackingOptions {
 
 // Reads the section and refuses unknown keys.
 TrackingOptions read_tracking_options(Section tracking);
+
+// What a MotionBank tries: a lively body and a calm one, a pad that moves and one that stands. The first of
+// each is the one that allows for more.
+std::vector<BodyNoise> body_hypotheses(const TrackingOptions& options);
+std::vector<PadNoise> pad_hypotheses(const TrackingOptions& options);
 
 }  // namespace perch
