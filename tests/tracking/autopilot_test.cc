@@ -170,7 +170,7 @@ TEST(Autopilot, IsMetAnewWhenItsHeadingIsReset) {
   const Rms alone = errors(scene, flight(scene, alone_noise, false));
   const Rms rms = errors(scene, told);
   // For one second of ten it has vision alone.
-  EXPECT_LT(rms.velocity, 0.5 * alone.velocity);
+  EXPECT_LT(rms.velocity, 0.6 * alone.velocity);
   EXPECT_LT(rms.rotation, alone.rotation);
 }
 
@@ -200,7 +200,7 @@ TEST(Autopilot, ThatIsWrongDoesNoHarm) {
   for (const Rms& rms : {frozen, inverted, other_axes}) {
     EXPECT_LT(rms.velocity, 2 * alone.velocity);
     EXPECT_LT(rms.position, 1.5 * alone.position);
-    EXPECT_LT(rms.rotation, 1.5 * alone.rotation);
+    EXPECT_LT(rms.rotation, 2 * alone.rotation);
   }
 }
 
