@@ -37,7 +37,7 @@ camera: {source: "images:*.png", model: cam.cameramodel, channel: green}
 frames: {body_from_base: identity}
 detection: {method: paper, paper: {threshold_fraction: 0.5, min_component_px: 7}}
 pose: {max_rms_sigmas: 2}
-tracking: {coast: 3}
+tracking: {coast: 3, history: 0.2, fuse_navigation: true}
 nav: mavlink+serial:/dev/ttyAMA0:921600
 outputs: {station: {listen: "127.0.0.1:8080"}}
 )");
@@ -49,6 +49,8 @@ outputs: {station: {listen: "127.0.0.1:8080"}}
   EXPECT_EQ(config.detection.paper.min_component_px, 7);
   EXPECT_EQ(config.pose.max_rms_sigmas, 2);
   EXPECT_EQ(config.tracking.coast, 3);
+  EXPECT_EQ(config.tracking.history, 0.2);
+  EXPECT_TRUE(config.tracking.fuse_navigation);
 }
 
 TEST(RunConfig, NamesTheLineAndTheKeyOfWhatIsWrong) {
