@@ -1,0 +1,278 @@
+#include "perch/links/mavlink/vehicle_link.h"
+
+#include <algorithm>
+
+namespace perch::mavlink {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kSecond = 1'000 * kMs;
+
+// Where only heartbeats come, at 1 Hz, three may be lost and the fourth a little late.
+constexpr int64_t kLostAfter = 3'500 * kMs;
+constexpr int64_t kHeartbeatPeriod = kSecond;
+// The bytes of one frame follow each other; what has not come by then does not come.
+constexpr int64_t kFrameWithin = 200 * kMs;
+// A sample from this far ahead of its arrival, or behind it, has a wrong time: clocks are matched to some ms,
+// and no link holds a message for seconds.
+constexpr int64_t kAhead = 20 * kMs, kBehind = 2 * kSecond;
+constexpr int64_t kVersionPeriod = 2 * kSecond;
+constexpr size_t kMaxTexts = 64;
+
+}  // namespace
+
+VehicleLink::VehicleLink(const VehicleLinkOptions& options, Signing* signing)
+    : options_(options),
+      parser_(signing),
+      writer_(options.system ? options.system : 1, options.component, signing) {}
+
+void VehicleLink::receive(std::span<const uint8_t> bytes, int64_t arrival_ns, bool datagram) {
+  const auto on_frame = [&](const Frame& frame) { handle(frame, arrival_ns); };
+  last_arrival_ns_ = arrival_ns;
+  if (datagram) {
+    parser_.parse_datagram(bytes, on_frame);
+  } else {
+    parser_.parse(bytes, on_frame);
+  }
+}
+
+std::vector<uint8_t> VehicleLink::tick(int64_t now_ns) {
+  if (parser_.waiting() && now_ns - last_arrival_ns_ > kFrameWithin)
+    parser_.give_up_waiting([&](const Frame& frame) { handle(frame, last_arrival_ns_); });
+  if (state_ == LinkState::kUp && now_ns - last_heard_ns_ > kLostAfter) {
+    state_ = LinkState::kLost;
+    ++statistics_.times_lost;
+  }
+  if (!last_heartbeat_out_ns_ || now_ns - *last_heartbeat_out_ns_ >= kHeartbeatPeriod) {
+    last_heartbeat_out_ns_ = now_ns;
+    Heartbeat heartbeat;
+    heartbeat.type = mav_type::kOnboardController;
+    heartbeat.autopilot = mav_autopilot::kInvalid;
+    heartbeat.system_status = kStateActive;
+    heartbeat.mavlink_version = kMavlinkVersion;
+    send(heartbeat);
+  }
+  if (state_ == LinkState::kUp) ask_for_things(now_ns);
+  return std::exchange(out_, {});
+}
+
+void VehicleLink::ask_for_things(int64_t now_ns) {
+  if (auto question = clock_.ask(now_ns)) {
+    question->target_system = autopilot_.system;
+    question->target_component = mav_component::kAutopilot;
+    send(*question);
+  }
+  if (auto command = streams_.ask(now_ns)) {
+    command->target_system = autopilot_.system;
+    send(*command);
+  }
+  if (!autopilot_.version && now_ns >= next_version_ns_) {
+    next_version_ns_ = now_ns + kVersionPeriod;
+    CommandLong command;
+    command.command = mav_command::kRequestMessage;
+    command.target_system = autopilot_.system;
+    command.target_component = mav_component::kAutopilot;
+    command.param1 = static_cast<float>(AutopilotVersion::kId);
+    send(command);
+  }
+  if (const auto name = parameters_.ask(now_ns)) {
+    ParamRequestRead request;
+    request.param_index = -1;  // by name
+    request.target_system = autopilot_.system;
+    request.target_component = mav_component::kAutopilot;
+    set_text(request.param_id, *name);
+    send(request);
+  }
+}
+
+void VehicleLink::handle(const Frame& frame, int64_t arrival_ns) {
+  if (const auto heartbeat = decode<Heartbeat>(frame)) return handle_heartbeat(*heartbeat, frame, arrival_ns);
+  if (state_ == LinkState::kSilent || frame.system != autopilot_.system) {
+    ++statistics_.foreign;
+    return;
+  }
+  if (frame.id() == GimbalDeviceAttitudeStatus::kId) return handle_gimbal(frame, arrival_ns);
+  // A rangefinder or a relay may have a component of its own; all else is the autopilot's to say.
+  if (frame.component != mav_component::kAutopilot && frame.id() != DistanceSensor::kId) {
+    ++statistics_.foreign;
+    return;
+  }
+  streams_.heard(frame.id(), arrival_ns);
+  // Any message is a sign of life: on a link that loses half of them four heartbeats in a row are soon lost.
+  if (frame.component == mav_component::kAutopilot) last_heard_ns_ = arrival_ns;
+  handle_of_autopilot(frame, arrival_ns);
+}
+
+// An autopilot is component 1 of a vehicle. Ground stations, gimbals, cameras and other companions say that
+// they are no autopilot; the system 0 is no one's.
+void VehicleLink::handle_heartbeat(const Heartbeat& heartbeat, const Frame& frame, int64_t arrival_ns) {
+  const bool autopilot = frame.system != 0 && frame.component == mav_component::kAutopilot &&
+                         heartbeat.autopilot != mav_autopilot::kInvalid && heartbeat.type != mav_type::kGcs;
+  const uint8_t ours = state_ == LinkState::kSilent ? options_.system : autopilot_.system;
+  if (!autopilot || (ours != 0 && frame.system != ours)) {
+    ++statistics_.foreign;
+    return;
+  }
+  ++statistics_.heartbeats;
+  last_heard_ns_ = arrival_ns;
+  if (state_ != LinkState::kUp) come_up(heartbeat, frame.system);
+  streams_.heard(Heartbeat::kId, arrival_ns);
+  autopilot_.type = heartbeat.type;
+  autopilot_.base_mode = heartbeat.base_mode;
+  autopilot_.custom_mode = heartbeat.custom_mode;
+}
+
+// Whatever was there before may have booted meanwhile: it is asked everything anew.
+void VehicleLink::come_up(const Heartbeat& heartbeat, uint8_t system) {
+  state_ = LinkState::kUp;
+  ++statistics_.times_up;
+  autopilot_ = {};
+  autopilot_.system = system;
+  autopilot_.autopilot = heartbeat.autopilot;
+  writer_.set_system(system);
+  streams_.want(wanted_streams());
+  parameters_.read(landing_parameters(heartbeat.autopilot));
+  next_version_ns_ = 0;
+}
+
+std::vector<WantedStream> VehicleLink::wanted_streams() const {
+  std::vector<WantedStream> streams = {
+      {AttitudeQuaternion::kId, options_.attitude_hz},
+      {LocalPositionNed::kId, options_.position_hz},
+      {DistanceSensor::kId, 10},
+      {ExtendedSysState::kId, 2},
+      {SystemTime::kId, 1},
+  };
+  // ArduPilot does not send it; on PX4 it alone tells of resets.
+  if (autopilot_.is_px4()) streams.push_back({Odometry::kId, options_.position_hz});
+  if (options_.gimbal) streams.push_back({GimbalDeviceAttitudeStatus::kId, options_.gimbal_hz});
+  return streams;
+}
+
+void VehicleLink::handle_of_autopilot(const Frame& frame, int64_t arrival_ns) {
+  switch (frame.id()) {
+    case Timesync::kId:
+      return handle_timesync(*decode<Timesync>(frame), frame, arrival_ns);
+    case AttitudeQuaternion::kId:
+      return handle_sample<AttitudeQuaternion>(frame, arrival_ns);
+    case Attitude::kId:
+      return handle_sample<Attitude>(frame, arrival_ns);
+    case LocalPositionNed::kId:
+      return handle_sample<LocalPositionNed>(frame, arrival_ns);
+    case Odometry::kId:
+      return handle_sample<Odometry>(frame, arrival_ns);
+    case DistanceSensor::kId:
+      return handle_sample<DistanceSensor>(frame, arrival_ns);
+    case ParamValue::kId:
+      return parameters_.receive(*decode<ParamValue>(frame), autopilot_.autopilot);
+    case CommandAck::kId:
+      return handle_command_ack(*decode<CommandAck>(frame), arrival_ns);
+    case AutopilotVersion::kId:
+      autopilot_.version = decode<AutopilotVersion>(frame);
+      return;
+    case ExtendedSysState::kId:
+      autopilot_.landed_state = decode<ExtendedSysState>(frame)->landed_state;
+      return;
+    case SystemTime::kId:
+      return handle_system_time(*decode<SystemTime>(frame), arrival_ns);
+    case Statustext::kId:
+      return handle_text(*decode<Statustext>(frame), arrival_ns);
+    default:
+      return;
+  }
+}
+
+void VehicleLink::handle_timesync(const Timesync& message, const Frame& frame, int64_t arrival_ns) {
+  // Old ArduPilots leave the targets out, which is 0: anyone.
+  const bool to_us = (message.target_system == 0 || message.target_system == writer_.system()) &&
+                     (message.target_component == 0 || message.target_component == writer_.component());
+  if (!to_us) return;
+  if (auto reply = clock_.receive(message, arrival_ns)) {
+    reply->target_system = frame.system;
+    reply->target_component = frame.component;
+    send(*reply);
+  }
+  if (clock_.statistics().steps != clock_steps_) {
+    clock_steps_ = clock_.statistics().steps;
+    // What is there was placed by a clock that has been set, or by one that booted.
+    history_.clear();
+    unix_minus_monotonic_ns_.reset();
+  }
+}
+
+std::optional<int64_t> VehicleLink::plausible(std::optional<int64_t> time_ns, int64_t arrival_ns) {
+  if (!time_ns) {
+    ++statistics_.times_unknown;
+    return std::nullopt;
+  }
+  if (*time_ns > arrival_ns + kAhead || *time_ns < arrival_ns - kBehind) {
+    ++statistics_.times_implausible;
+    return std::nullopt;
+  }
+  return time_ns;
+}
+
+template <class Message>
+void VehicleLink::handle_sample(const Frame& frame, int64_t arrival_ns) {
+  const Message message = *decode<Message>(frame);
+  std::optional<int64_t> time_ns;
+  if (frame.component != mav_component::kAutopilot) {
+    time_ns = arrival_ns;  // it has a clock of its own, which is not matched
+  } else if constexpr (requires { message.time_boot_ms; }) {
+    time_ns = clock_.local_from_boot_ms(message.time_boot_ms, arrival_ns);
+  } else {
+    constexpr uint64_t kMost = uint64_t{INT64_MAX} / 1000;
+    time_ns =
+        clock_.local_from_remote(static_cast<int64_t>(std::min(message.time_usec, kMost) * 1000), arrival_ns);
+  }
+  time_ns = plausible(time_ns, arrival_ns);
+  if (time_ns && !history_.add(message, *time_ns)) ++statistics_.samples_refused;
+}
+
+void VehicleLink::handle_gimbal(const Frame& frame, int64_t arrival_ns) {
+  const auto message = *decode<GimbalDeviceAttitudeStatus>(frame);
+  streams_.heard(frame.id(), arrival_ns);
+  // The request goes to whoever sends it: the gimbal itself, or the autopilot for it.
+  streams_.set_component(frame.id(), frame.component);
+  // A gimbal's stamps are of its own clock. Often it was switched on with the autopilot, and its time would
+  // look right while it is a second off: its samples are as old as they are on arrival.
+  const bool own_clock = frame.component != mav_component::kAutopilot;
+  const auto time_ns = plausible(
+      own_clock ? arrival_ns : clock_.local_from_boot_ms(message.time_boot_ms, arrival_ns), arrival_ns);
+  if (time_ns && !history_.add(message, frame.component, *time_ns)) ++statistics_.samples_refused;
+}
+
+void VehicleLink::handle_command_ack(const CommandAck& ack, int64_t arrival_ns) {
+  const bool to_us = (ack.target_system == 0 || ack.target_system == writer_.system()) &&
+                     (ack.target_component == 0 || ack.target_component == writer_.component());
+  if (to_us && ack.command == mav_command::kSetMessageInterval) streams_.acknowledged(ack.result, arrival_ns);
+}
+
+void VehicleLink::handle_system_time(const SystemTime& message, int64_t arrival_ns) {
+  // Before it has the time from satellites it counts from 0, or from when its firmware was made.
+  constexpr uint64_t k2020_us = 1'577'836'800ULL * 1'000'000, k2100_us = 4'102'444'800ULL * 1'000'000;
+  if (message.time_unix_usec < k2020_us || message.time_unix_usec > k2100_us) return;
+  const auto time_ns = plausible(clock_.local_from_boot_ms(message.time_boot_ms, arrival_ns), arrival_ns);
+  if (time_ns) unix_minus_monotonic_ns_ = static_cast<int64_t>(message.time_unix_usec) * 1000 - *time_ns;
+}
+
+void VehicleLink::handle_text(const Statustext& message, int64_t arrival_ns) {
+  if (texts_.size() >= kMaxTexts) texts_.pop_front();
+  texts_.push_back({arrival_ns, message.severity, printable(text_of(message.text))});
+}
+
+std::vector<VehicleText> VehicleLink::take_texts() {
+  std::vector<VehicleText> texts(texts_.begin(), texts_.end());
+  texts_.clear();
+  return texts;
+}
+
+std::string printable(std::string_view text) {
+  std::string clean(text);
+  for (char& c : clean) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return clean;
+}
+
+}  // namespace perch::mavlink

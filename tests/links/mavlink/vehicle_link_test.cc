@@ -1,0 +1,323 @@
+#include "perch/links/mavlink/vehicle_link.h"
+
+#include <gtest/gtest.h>
+
+#include "links/mavlink/fake_autopilot.h"
+#include "perch/geometry/so3.h"
+
+namespace perch::mavlink {
+namespace {
+
+Heartbeat heartbeat_of(uint8_t type, uint8_t autopilot) {
+  Heartbeat heartbeat;
+  heartbeat.type = type;
+  heartbeat.autopilot = autopilot;
+  return heartbeat;
+}
+
+template <class Message>
+std::vector<uint8_t> frame_from(uint8_t system, uint8_t component, const Message& message) {
+  std::vector<uint8_t> bytes;
+  FrameWriter(system, component).append(bytes, message);
+  return bytes;
+}
+
+// Swings about all axes while it flies an eight.
+TrueMotion swing(int64_t now_ns) {
+  const double t = static_cast<double>(now_ns % (10'000 * kSecond)) * 1e-9;
+  const auto rotation = [](double s) {
+    return so3_exp({0.3 * std::sin(2 * s), 0.2 * std::sin(3 * s + 1), 0.5 * std::sin(s)});
+  };
+  TrueMotion motion;
+  motion.ned_from_body = {rotation(t), {5 * std::sin(t), 3 * std::sin(2 * t), -10 + std::cos(t)}};
+  motion.body_velocity_in_ned = {5 * std::cos(t), 6 * std::cos(2 * t), -std::sin(t)};
+  motion.body_rate = so3_log(rotation(t - 1e-4).conjugate() * rotation(t + 1e-4)) / 2e-4;
+  return motion;
+}
+
+TEST(VehicleLink, TakesOnlyAnAutopilotForOne) {
+  VehicleLink link({});
+  const auto hear = [&](const std::vector<uint8_t>& frame) { link.receive(frame, kSecond, true); };
+  hear(frame_from(255, 190, heartbeat_of(mav_type::kGcs, mav_autopilot::kInvalid)));
+  hear(frame_from(1, 154, heartbeat_of(mav_type::kGimbal, mav_autopilot::kInvalid)));
+  hear(frame_from(1, 191, heartbeat_of(mav_type::kOnboardController, mav_autopilot::kInvalid)));
+  hear(frame_from(7, 1, heartbeat_of(mav_type::kGcs, mav_autopilot::kArdupilot)));
+  hear(frame_from(0, 1, heartbeat_of(2, mav_autopilot::kArdupilot)));
+  EXPECT_EQ(link.state(), LinkState::kSilent);
+  EXPECT_EQ(link.statistics().foreign, 5u);
+  hear(frame_from(3, 1, heartbeat_of(2, mav_autopilot::kPx4)));
+  EXPECT_EQ(link.state(), LinkState::kUp);
+  EXPECT_EQ(link.autopilot().system, 3);
+  EXPECT_TRUE(link.autopilot().is_px4());
+  // Another vehicle on the same network changes nothing.
+  hear(frame_from(4, 1, heartbeat_of(2, mav_autopilot::kArdupilot)));
+  EXPECT_EQ(link.autopilot().system, 3);
+  EXPECT_TRUE(link.autopilot().is_px4());
+}
+
+TEST(VehicleLink, WaitsForTheSystemItIsToldTo) {
+  VehicleLinkOptions options;
+  options.system = 2;
+  VehicleLink link(options);
+  link.receive(frame_from(1, 1, heartbeat_of(2, 3)), kSecond, true);
+  EXPECT_EQ(link.state(), LinkState::kSilent);
+  link.receive(frame_from(2, 1, heartbeat_of(2, 3)), kSecond, true);
+  EXPECT_EQ(link.state(), LinkState::kUp);
+}
+
+TEST(VehicleLink, SaysOnceASecondThatItIsTheVehiclesCompanion) {
+  LinkedWorld world;
+  world.run(10);
+  EXPECT_NEAR(world.autopilot.heard[Heartbeat::kId], 10, 1);
+  const std::set<std::pair<uint8_t, uint8_t>> us = {{1, 191}};
+  EXPECT_EQ(world.autopilot.speakers, us);
+}
+
+TEST(VehicleLink, GetsItsStreamsVersionAndParametersThroughLossAndDeafness) {
+  for (const uint8_t kind : {mav_autopilot::kArdupilot, mav_autopilot::kPx4}) {
+    LinkedWorld world(kind);
+    world.autopilot.autopilot = kind;
+    world.autopilot.loss = 0.3;
+    world.autopilot.deaf_requests = 3;
+    if (kind == mav_autopilot::kPx4) world.autopilot.parameters = {{"RTL_PLD_MD", 2}, {"PLD_BTOUT", 5.5}};
+    world.run(60);
+    EXPECT_NEAR(world.link.rate_hz(AttitudeQuaternion::kId, world.now_ns), 70, 10);
+    EXPECT_NEAR(world.link.rate_hz(LocalPositionNed::kId, world.now_ns), 21, 5);
+    EXPECT_TRUE(world.link.parameters().complete());
+    EXPECT_EQ(world.link.parameters().values(), world.autopilot.parameters) << int{kind};
+    EXPECT_TRUE(world.link.parameters().absent().count(kind == 3 ? "PLND_STRICT" : "VTE_EN"));
+    ASSERT_TRUE(world.link.autopilot().version);
+    EXPECT_EQ(world.link.autopilot().version->flight_sw_version, 0x04060000u);
+    EXPECT_EQ(world.link.autopilot().landed_state, kLandedStateOnGround);
+    EXPECT_TRUE(world.link.autopilot().armed());
+    EXPECT_GT(world.link.parser_statistics().sources.at({1, 1}).lost, 500u);
+  }
+}
+
+TEST(VehicleLink, DoesNotPesterAnAutopilotThatHasNoSuchStream) {
+  LinkedWorld world;
+  world.autopilot.unsupported = {DistanceSensor::kId};
+  world.run(50);
+  EXPECT_TRUE(world.link.streams().refused(DistanceSensor::kId));
+  // Five streams, one request each, one version and some retries for what was slow to come.
+  EXPECT_LT(world.autopilot.heard[CommandLong::kId], 12);
+}
+
+TEST(VehicleLink, KeepsTheAttitudeOnOurClock) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    LinkedWorld world(seed);
+    world.autopilot.motion = swing;
+    world.run(10);
+    double worst = 0, worst_position = 0;
+    for (int i = 0; i < 2000; ++i) {
+      world.run(0.003);
+      const int64_t then = world.now_ns - 20 * kMs - world.autopilot.rng.index(1'900'000'000);
+      const auto attitude = world.link.history().attitude_at(then);
+      const auto motion = world.link.history().motion_at(then);
+      ASSERT_TRUE(attitude && motion);
+      const TrueMotion truth = swing(then);
+      worst = std::max(worst, attitude->ned_from_body.angularDistance(truth.ned_from_body.rotation));
+      worst_position =
+          std::max(worst_position, (motion->body_in_ned - truth.ned_from_body.translation).norm());
+    }
+    // 1.2 rad/s times half a ms of cutting and half a ms of the clocks; 8 m/s likewise.
+    EXPECT_LT(worst, 1.6e-3);
+    EXPECT_LT(worst_position, 8e-3 + 2e-3);
+    EXPECT_EQ(world.link.statistics().times_implausible, 0u);
+  }
+}
+
+TEST(VehicleLink, IsLostInSilenceAndComesBackByItself) {
+  LinkedWorld world;
+  world.autopilot.motion = swing;
+  world.run(10);
+  world.autopilot.silent = true;
+  world.run(3);
+  EXPECT_EQ(world.link.state(), LinkState::kUp);
+  world.run(2);
+  EXPECT_EQ(world.link.state(), LinkState::kLost);
+  world.run(60);
+  EXPECT_FALSE(world.link.history().attitude_at(world.now_ns));
+  world.autopilot.silent = false;
+  world.autopilot.reboot(world.now_ns);  // its clock starts from 0, its streams are off
+  world.run(20);
+  EXPECT_EQ(world.link.state(), LinkState::kUp);
+  EXPECT_EQ(world.link.statistics().times_lost, 1u);
+  EXPECT_EQ(world.link.statistics().times_up, 2u);
+  EXPECT_EQ(world.link.clock().statistics().steps, 1u);
+  const int64_t then = world.now_ns - 100 * kMs;
+  const auto attitude = world.link.history().attitude_at(then);
+  ASSERT_TRUE(attitude);
+  EXPECT_LT(attitude->ned_from_body.angularDistance(swing(then).ned_from_body.rotation), 2e-3);
+}
+
+TEST(VehicleLink, ARebootBetweenTwoHeartbeatsIsNoticedByTheClock) {
+  LinkedWorld world;
+  world.autopilot.motion = swing;
+  world.run(20);
+  world.autopilot.booted_ns = world.now_ns - kSecond;
+  // Meanwhile what is in the history is never wrong by more than three exchanges of 2 ms jitter leave open:
+  // 4 ms at 1.2 rad/s.
+  for (int i = 0; i < 50; ++i) {
+    world.run(0.1);
+    const int64_t then = world.now_ns - 50 * kMs;
+    if (const auto attitude = world.link.history().attitude_at(then)) {
+      EXPECT_LT(attitude->ned_from_body.angularDistance(swing(then).ned_from_body.rotation), 6e-3);
+    }
+  }
+  EXPECT_EQ(world.link.clock().statistics().steps, 1u);
+  EXPECT_TRUE(world.link.history().attitude_at(world.now_ns - 50 * kMs));
+}
+
+TEST(VehicleLink, AnswersAQuestionForTheTimeAtTheNextTick) {
+  VehicleLink link({});
+  link.receive(frame_from(9, 1, heartbeat_of(2, 12)), kSecond, true);
+  link.tick(kSecond);
+  Timesync question;
+  question.ts1 = 4711;
+  link.receive(frame_from(9, 1, question), 2 * kSecond, true);
+  question.target_system = 9;
+  question.target_component = 42;  // someone else's
+  link.receive(frame_from(9, 1, question), 2 * kSecond, true);
+  FrameParser parser;
+  std::vector<Timesync> answers;
+  parser.parse_datagram(link.tick(2 * kSecond), [&](const Frame& frame) {
+    if (const auto message = decode<Timesync>(frame); message && message->tc1 != 0)
+      answers.push_back(*message);
+  });
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_EQ(answers[0].tc1, 2 * kSecond);
+  EXPECT_EQ(answers[0].ts1, 4711);
+  EXPECT_EQ(answers[0].target_system, 9);
+  EXPECT_EQ(answers[0].target_component, 1);
+}
+
+TEST(VehicleLink, NothingOfAForeignSystemGetsIntoTheHistory) {
+  LinkedWorld world;
+  world.run(5);
+  AttitudeQuaternion attitude;
+  attitude.time_boot_ms = static_cast<uint32_t>(world.autopilot.boot_time_ns(world.now_ns) / kMs);
+  attitude.q2 = 1;  // upside down
+  for (const auto& [system, component] : {std::pair{2, 1}, {0, 1}, {255, 190}, {1, 154}}) {
+    world.link.receive(frame_from(static_cast<uint8_t>(system), static_cast<uint8_t>(component), attitude),
+                       world.now_ns + kMs, true);
+  }
+  const auto latest = world.link.history().attitudes().latest();
+  ASSERT_TRUE(latest);
+  EXPECT_GT(latest->ned_from_body.w(), 0.99);
+  EXPECT_EQ(world.link.statistics().foreign, 4u);
+}
+
+TEST(VehicleLink, RefusesTimesAndNumbersThatCannotBe) {
+  LinkedWorld world;
+  world.run(5);
+  const auto boot_ms = static_cast<uint32_t>(world.autopilot.boot_time_ns(world.now_ns) / kMs);
+  const size_t before = world.link.history().attitudes().size();
+  const auto timeless = [&] {
+    return world.link.statistics().times_implausible + world.link.statistics().times_unknown;
+  };
+  const uint64_t timeless_before = timeless();
+  AttitudeQuaternion attitude;
+  attitude.q1 = 1;
+  for (const uint32_t off : {100u, 0u - 10'000u, 0x7FFFFFFFu, 0x80000000u}) {
+    attitude.time_boot_ms = boot_ms + off;
+    world.link.receive(frame_from(1, 1, attitude), world.now_ns, true);
+  }
+  Odometry odometry;
+  odometry.frame_id = odometry.child_frame_id = 1;
+  odometry.q[0] = 1;
+  for (const uint64_t us : {uint64_t{0}, UINT64_MAX, uint64_t{1} << 63}) {
+    odometry.time_usec = us;
+    world.link.receive(frame_from(1, 1, odometry), world.now_ns, true);
+  }
+  attitude.time_boot_ms = boot_ms + 1;
+  for (const float bad : {NAN, INFINITY, 3.0f}) {
+    attitude.q3 = bad;
+    world.link.receive(frame_from(1, 1, attitude), world.now_ns + kMs, true);
+  }
+  EXPECT_EQ(world.link.history().attitudes().size(), before);
+  EXPECT_EQ(timeless() - timeless_before, 7u);
+  EXPECT_EQ(world.link.statistics().samples_refused, 3u);
+}
+
+TEST(VehicleLink, TextsAreFitToPrint) {
+  VehicleLink link({});
+  link.receive(frame_from(1, 1, heartbeat_of(2, 3)), kSecond, true);
+  Statustext text;
+  text.severity = 3;
+  set_text(text.text,
+           "\xff\xfe\x80"
+           "abc\x1b[2J");
+  link.receive(frame_from(1, 1, text), kSecond, true);
+  const auto texts = link.take_texts();
+  ASSERT_EQ(texts.size(), 1u);
+  EXPECT_EQ(texts[0].text, "???abc?[2J");
+  EXPECT_TRUE(link.take_texts().empty());
+}
+
+TEST(VehicleLink, AFalseMagicHoldsNothingBackForLong) {
+  VehicleLink link({});
+  std::vector<uint8_t> bytes = {0xFD, 0xFF, 0, 0, 0, 1, 1, 0, 0, 0};
+  const auto heartbeat = frame_from(1, 1, heartbeat_of(2, 3));
+  bytes.insert(bytes.end(), heartbeat.begin(), heartbeat.end());
+  link.receive(bytes, kSecond, false);
+  link.tick(kSecond + 100 * kMs);
+  EXPECT_EQ(link.state(), LinkState::kSilent);
+  link.tick(kSecond + 300 * kMs);
+  EXPECT_EQ(link.state(), LinkState::kUp);
+}
+
+TEST(VehicleLink, WithAKeyHearsOnlyThoseWhoHaveIt) {
+  SigningOptions options;
+  options.key.fill(7);
+  Signing ours(options, 1000), theirs(options, 1000);
+  VehicleLink link({}, &ours);
+  link.receive(frame_from(1, 1, heartbeat_of(2, 3)), kSecond, true);
+  EXPECT_EQ(link.state(), LinkState::kSilent);
+  std::vector<uint8_t> bytes;
+  FrameWriter(1, 1, &theirs).append(bytes, heartbeat_of(2, 3));
+  link.receive(bytes, kSecond, true);
+  EXPECT_EQ(link.state(), LinkState::kUp);
+  FrameParser parser(&theirs);
+  int frames = 0;
+  parser.parse_datagram(link.tick(kSecond), [&](const Frame& frame) { frames += frame.is_signed; });
+  EXPECT_GE(frames, 3);
+}
+
+TEST(VehicleLink, GarbageBetweenFramesAndRandomMessagesDoNoHarm) {
+  LinkedWorld world;
+  world.autopilot.motion = swing;
+  TestRng rng;
+  for (int i = 0; i < 3000; ++i) {
+    world.run(0.005);
+    const auto& all = known_messages();
+    const MessageInfo& info = all[static_cast<size_t>(rng.index(static_cast<int>(all.size())))];
+    std::vector<uint8_t> message(info.struct_size), wire;
+    for (uint8_t& byte : message) byte = static_cast<uint8_t>(rng.index(256));
+    append_frame(wire, {2, 0, 2, 1}, info, message.data());  // of another vehicle
+    for (int j = rng.index(40); j > 0; --j) wire.push_back(static_cast<uint8_t>(rng.index(256)));
+    world.link.receive(wire, world.now_ns, true);
+    wire.clear();
+    // Of our own, but for what would rightly change what is known.
+    if (info.id == Timesync::kId || info.id == Heartbeat::kId || info.id == ParamValue::kId) continue;
+    append_frame(wire, {2, 0, 1, 1}, info, message.data());
+    world.link.receive(wire, world.now_ns, true);
+  }
+  const int64_t then = world.now_ns - 100 * kMs;
+  ASSERT_TRUE(world.link.history().attitude_at(then));
+  EXPECT_LT(world.link.history().attitude_at(then)->ned_from_body.angularDistance(
+                swing(then).ned_from_body.rotation),
+            2e-3);
+  EXPECT_EQ(world.link.state(), LinkState::kUp);
+}
+
+TEST(VehicleLink, KnowsTheWallClock) {
+  LinkedWorld world;
+  world.run(5);
+  ASSERT_TRUE(world.link.unix_minus_monotonic_ns());
+  EXPECT_NEAR(static_cast<double>(*world.link.unix_minus_monotonic_ns() - 1'800'000'000 * kSecond), 0,
+              2.0 * kMs);
+}
+
+}  // namespace
+}  // namespace perch::mavlink
