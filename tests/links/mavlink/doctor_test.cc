@@ -39,6 +39,8 @@ VehicleSnapshot healthy_px4() {
   VehicleSnapshot is = healthy(mav_autopilot::kPx4);
   is.profile = LandingProfile::kPx4;
   is.odometry_hz = 30;
+  is.global_hz = 1;
+  is.asked_for_time = 600;
   is.parameters = {{"RTL_PLD_MD", 2},       {"PLD_BTOUT", 5},        {"PLD_HACC_RAD", 0.2},
                    {"PLD_MAX_SRCH", 3},     {"LTEST_SENS_POS_X", 0}, {"LTEST_SENS_POS_Y", 0},
                    {"LTEST_SENS_POS_Z", 0}, {"LTEST_SENS_ROT", 0}};
@@ -155,20 +157,24 @@ TEST(Doctor, FindsEachFaultOfALinkAndNothingElse) {
 }
 
 TEST(Doctor, FindsEachFaultOfAPx4AndNothingElse) {
-  expect_each(healthy_px4(),
-              {
-                  {set("RTL_PLD_MD", 0), kWarning, "RTL_PLD_MD", "0", "set RTL_PLD_MD to 1"},
-                  {set("PLD_BTOUT", 0.5), kWarning, "PLD_BTOUT", "0.5", "to 5"},
-                  {set("PLD_HACC_RAD", 0.05), kWarning, "PLD_HACC_RAD", "0.05", "to 0.2"},
-                  {set("PLD_MAX_SRCH", 0), kWarning, "PLD_MAX_SRCH", "0", "to 3"},
-                  {set("LTEST_SENS_POS_X", 0.1), kWarning, "LTEST_SENS_POS_X", "0.1", "to 0"},
-                  {set("LTEST_SENS_ROT", 2), kWarning, "LTEST_SENS_ROT", "2", "to 0"},
-                  {set("VTE_EN", 1), kWarning, "VTE_EN", "1", "px4-vte"},
-                  {[](auto& is) { is.clock->min_round_trip_ns = 30'000'000; }, kWarning,
-                   "TIMESYNC round trip", "30 ms", "serial"},
-                  {[](auto& is) { is.position_hz = 5; }, kError, "position rate", "5 Hz", "10 Hz"},
-                  {[](auto& is) { is.odometry_hz = 0; }, kWarning, "ODOMETRY", "not received", "331"},
-              });
+  expect_each(
+      healthy_px4(),
+      {
+          {set("RTL_PLD_MD", 0), kWarning, "RTL_PLD_MD", "0", "set RTL_PLD_MD to 1"},
+          {set("PLD_BTOUT", 0.5), kWarning, "PLD_BTOUT", "0.5", "to 5"},
+          {set("PLD_HACC_RAD", 0.05), kWarning, "PLD_HACC_RAD", "0.05", "to 0.2"},
+          {set("PLD_MAX_SRCH", 0), kWarning, "PLD_MAX_SRCH", "0", "to 3"},
+          {set("LTEST_SENS_POS_X", 0.1), kWarning, "LTEST_SENS_POS_X", "0.1", "to 0"},
+          {set("LTEST_SENS_ROT", 2), kWarning, "LTEST_SENS_ROT", "2", "to 0"},
+          {set("VTE_EN", 1), kWarning, "VTE_EN", "1", "px4-vte"},
+          {[](auto& is) { is.clock->min_round_trip_ns = 30'000'000; }, kWarning, "TIMESYNC round trip",
+           "30 ms", "serial"},
+          {[](auto& is) { is.position_hz = 5; }, kError, "position rate", "5 Hz", "10 Hz"},
+          {[](auto& is) { is.odometry_hz = 0; }, kWarning, "ODOMETRY", "not received", "331"},
+          {[](auto& is) { is.global_hz = 0; }, kWarning, "GLOBAL_POSITION_INT", "not received", "GNSS"},
+          {[](auto& is) { is.asked_for_time = 0; }, kWarning, "TIMESYNC of PX4", "not asked", "Onboard"},
+          {[](auto& is) { is.asked_for_time = 40; }, kNote, "TIMESYNC of PX4", "40 of 500 exchanges", ""},
+      });
   expect_each(healthy_vte(), {
                                  {set("VTE_EN", 0), kWarning, "VTE_EN", "0", "set VTE_EN to 1"},
                                  {[](auto& is) { is.parameters.erase("VTE_EN"); }, kWarning, "VTE_EN",

@@ -149,6 +149,26 @@ TEST(TimeSync, OneFalseAnswerChangesNothing) {
   }
 }
 
+TEST(TimeSync, AnswersWithoutAMeaningMakeNoClockAndNoHarm) {
+  TestRng rng;
+  for (int round = 0; round < 200; ++round) {
+    TimeSync sync;
+    int64_t now = rng.index(1'000'000'000);
+    for (int i = 0; i < 100; ++i) {
+      now += 100 * kMs;
+      const auto question = sync.ask(now);
+      if (!question) continue;
+      Timesync reply;
+      reply.tc1 = static_cast<int64_t>(rng.uniform(-9.2e18, 9.2e18)) >> (round % 8 * 8);
+      reply.ts1 = question->ts1;
+      sync.receive(reply, now + rng.index(20'000'000));
+      sync.estimate(now + static_cast<int64_t>(rng.uniform(0, 1e12)));
+      sync.local_from_remote(static_cast<int64_t>(rng.uniform(-9.2e18, 9.2e18)), now);
+      sync.local_from_boot_ms(static_cast<uint32_t>(rng.uniform(0, 4e9)), now);
+    }
+  }
+}
+
 TEST(TimeSync, AnswersToOthersAndAnswersTwiceDoNotCount) {
   TimeSync sync;
   World world;

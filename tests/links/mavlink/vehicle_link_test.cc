@@ -87,7 +87,7 @@ TEST(VehicleLink, GetsItsStreamsVersionAndParametersThroughLossAndDeafness) {
     EXPECT_EQ(world.link.parameters().values(), world.autopilot.parameters) << int{kind};
     EXPECT_TRUE(world.link.parameters().absent().count(kind == 3 ? "PLND_STRICT" : "VTE_EN"));
     ASSERT_TRUE(world.link.autopilot().version);
-    EXPECT_EQ(world.link.autopilot().version->flight_sw_version, 0x04060000u);
+    EXPECT_EQ(version_text(*world.link.autopilot().version), "4.6.0");
     EXPECT_EQ(world.link.autopilot().landed_state, kLandedStateOnGround);
     EXPECT_TRUE(world.link.autopilot().armed());
     EXPECT_GT(world.link.parser_statistics().sources.at({1, 1}).lost, 500u);
@@ -139,6 +139,8 @@ TEST(VehicleLink, IsLostInSilenceAndComesBackByItself) {
   world.run(60);
   EXPECT_FALSE(world.link.history().attitude_at(world.now_ns));
   world.autopilot.silent = false;
+  world.run(0.1);
+  EXPECT_EQ(world.link.parameters().values().at("PLND_LAG"), 0.0625);  // as it was, until it is read again
   world.autopilot.reboot(world.now_ns);  // its clock starts from 0, its streams are off
   world.run(20);
   EXPECT_EQ(world.link.state(), LinkState::kUp);

@@ -17,6 +17,11 @@ std::string number(double value) {
   return text;
 }
 
+// A parameter that is a set of bits; from the wire it may be any number.
+bool has_bit(double value, int64_t bit) {
+  return value >= 0 && value < 1e9 && (static_cast<int64_t>(value) & bit) != 0;
+}
+
 // Collects findings about one snapshot.
 struct Examination {
   const VehicleSnapshot& is;
@@ -58,6 +63,16 @@ void examine_clock(Examination& e) {
           "above 10 ms PX4 does not use our time stamps but the time of arrival, without a word",
           "connect by Ethernet, USB or a serial port with 921600 baud, not by a radio");
   }
+  // mavlink_timesync.h: the estimate counts as converged after 500 exchanges, which at 10 Hz take 50 s.
+  if (e.is.autopilot.is_px4() && e.is.asked_for_time == 0) {
+    e.add(Severity::kWarning, "TIMESYNC of PX4", "not asked",
+          "PX4 does not learn our clock and takes a measurement for as old as it is on arrival",
+          "set the port's MAV_0_MODE (_1_, _2_) to Onboard");
+  } else if (e.is.autopilot.is_px4() && e.is.asked_for_time < 500) {
+    e.add(Severity::kNote, "TIMESYNC of PX4",
+          number(static_cast<double>(e.is.asked_for_time)) + " of 500 exchanges",
+          "until then PX4 takes a measurement for as old as it is on arrival");
+  }
 }
 
 void examine_streams(Examination& e) {
@@ -82,6 +97,10 @@ void examine_streams(Examination& e) {
     e.add(Severity::kWarning, "ODOMETRY", "not received",
           "it alone tells when PX4 moves its map; small moves between exposure and sending go unnoticed",
           "allow SET_MESSAGE_INTERVAL for message 331");
+  }
+  if (e.is.autopilot.is_px4() && e.is.global_hz == 0) {
+    e.add(Severity::kWarning, "GLOBAL_POSITION_INT", "not received",
+          "PX4 refuses a precision landing without a valid global position", "wait for a GNSS fix");
   }
   if (e.is.gimbal) {
     low("gimbal rate", e.is.gimbal_hz, 20, e.is.gimbal_hz == 0 ? Severity::kError : Severity::kWarning,
@@ -203,7 +222,7 @@ void examine_ardupilot(Examination& e) {
   examine_ardupilot_lag(e);
   examine_ardupilot_descent(e);
   examine_ardupilot_range(e);
-  if (const auto options = e.value("PLND_OPTIONS"); options && (static_cast<int64_t>(*options) & 1))
+  if (const auto options = e.value("PLND_OPTIONS"); options && has_bit(*options, 1))
     e.add(Severity::kNote, "PLND_OPTIONS", number(*options), "the pad is taken for a moving one");
 }
 
@@ -249,7 +268,7 @@ void examine_px4_vte(Examination& e) {
   }
   // Bit 2: the target's relative position from vision.
   e.parameter(
-      "VTE_AID_MASK", Severity::kError, [](double v) { return !(static_cast<int64_t>(v) & 4); },
+      "VTE_AID_MASK", Severity::kError, [](double v) { return !has_bit(v, 4); },
       "vision is not among what the estimator fuses", "add 4 to VTE_AID_MASK and reboot");
   e.parameter(
       "VTE_EVP_NOISE", Severity::kWarning, [](double v) { return v > 0.03; },
@@ -276,6 +295,8 @@ VehicleSnapshot snapshot_of(const VehicleLink& link, LandingProfile profile, int
   }
   is.clock = link.clock().estimate(now_ns);
   is.odometry_hz = link.rate_hz(Odometry::kId, now_ns);
+  is.global_hz = link.rate_hz(GlobalPositionInt::kId, now_ns);
+  is.asked_for_time = link.clock().statistics().answered;
   is.attitude_hz = std::max(
       {link.rate_hz(AttitudeQuaternion::kId, now_ns), link.rate_hz(Attitude::kId, now_ns), is.odometry_hz});
   is.position_hz = std::max(is.odometry_hz, link.rate_hz(LocalPositionNed::kId, now_ns));

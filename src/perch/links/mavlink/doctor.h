@@ -24,8 +24,10 @@ struct VehicleSnapshot {
   double attitude_hz = 0;
   double position_hz = 0;  // ODOMETRY or LOCAL_POSITION_NED, whichever comes
   double odometry_hz = 0;
-  double range_hz = 0;       // of a rangefinder that looks down
-  double lost_fraction = 0;  // of the autopilot's frames
+  double global_hz = 0;         // GLOBAL_POSITION_INT
+  uint64_t asked_for_time = 0;  // how often the autopilot asked for our time
+  double range_hz = 0;          // of a rangefinder that looks down
+  double lost_fraction = 0;     // of the autopilot's frames
 
   // Of our own set-up.
   bool gimbal = false;  // the camera is on one, and its angles come by MAVLink

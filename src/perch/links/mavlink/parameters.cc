@@ -65,8 +65,8 @@ double parameter_value(const ParamValue& message, uint8_t autopilot) {
 
 void ParameterReader::read(const std::vector<std::string>& names) {
   wanted_.clear();
-  values_.clear();
   for (const std::string& name : names) wanted_[name];
+  std::erase_if(values_, [&](const auto& entry) { return !wanted_.count(entry.first); });
 }
 
 std::optional<std::string> ParameterReader::ask(int64_t now_ns) {

@@ -20,7 +20,8 @@ double parameter_value(const ParamValue& message, uint8_t autopilot);
 // Asks for parameters by name, again until each has come or has to be taken for absent.
 class ParameterReader {
  public:
-  // Starts anew.
+  // Starts anew. Values of these names that are known stay so until they are read again: after a cut of the
+  // link they are better than none.
   void read(const std::vector<std::string>& names);
 
   // The name to ask for now, if any.

@@ -20,6 +20,8 @@ constexpr int64_t kWindow = 60 * kSecond;
 constexpr int64_t kTooLate = kSecond;
 // Autopilots' crystals are off by tens of ppm.
 constexpr double kSkewSigma = 1e-4;
+// What runs this wrong is no clock, but answers without a meaning.
+constexpr double kNoClock = 5e-3;
 // The remote side's own delay, scheduling and rounding, even on a quick way.
 constexpr double kFloorNs = 0.1e6;
 // What a clock may be off and still place an image: with more it is said to be unknown.
@@ -138,7 +140,7 @@ double TimeSync::sigma_at(int64_t now_ns) const {
 std::optional<ClockEstimate> TimeSync::estimate(int64_t now_ns) const {
   if (!line_ || samples_.size() < kEnoughSamples) return std::nullopt;
   const double sigma = sigma_at(now_ns);
-  if (!(sigma < kMaxSigmaNs)) return std::nullopt;
+  if (!(sigma < kMaxSigmaNs) || std::abs(line_->skew) > kNoClock) return std::nullopt;
   return ClockEstimate{now_ns, line_->reference_ns + std::llround(offset_at(now_ns)), line_->skew,
                        std::llround(sigma), line_->min_round_trip_ns};
 }

@@ -145,6 +145,9 @@ std::vector<WantedStream> VehicleLink::wanted_streams() const {
   };
   // ArduPilot does not send it; on PX4 it alone tells of resets.
   if (autopilot_.is_px4()) streams.push_back({Odometry::kId, options_.position_hz});
+  // Only whether it comes matters: PX4 sends it while its global position is valid, and does not land on a
+  // pad without.
+  if (autopilot_.is_px4()) streams.push_back({GlobalPositionInt::kId, 1});
   if (options_.gimbal) streams.push_back({GimbalDeviceAttitudeStatus::kId, options_.gimbal_hz});
   return streams;
 }
@@ -265,6 +268,13 @@ std::vector<VehicleText> VehicleLink::take_texts() {
   std::vector<VehicleText> texts(texts_.begin(), texts_.end());
   texts_.clear();
   return texts;
+}
+
+std::string version_text(const AutopilotVersion& version) {
+  const auto part = [&](int byte) {
+    return std::to_string((version.flight_sw_version >> (8 * byte)) & 0xFF);
+  };
+  return part(3) + "." + part(2) + "." + part(1);
 }
 
 std::string printable(std::string_view text) {

@@ -147,6 +147,9 @@ class VehicleLink {
   VehicleLinkStatistics statistics_;
 };
 
+// "4.6.0", as flight_sw_version has it.
+std::string version_text(const AutopilotVersion& version);
+
 // Text from the wire as it may be printed: other bytes become '?'.
 std::string printable(std::string_view text);
 
