@@ -49,7 +49,8 @@ class FakeAutopilot {
   std::function<TrueMotion(int64_t)> motion = [](int64_t) { return TrueMotion{}; };
 
   // ---- What the test looks at.
-  std::map<uint32_t, int> heard;  // messages of ours, by id
+  std::map<uint32_t, int> heard;      // messages of ours, by id
+  std::map<uint32_t, int> intervals;  // requests for each message's interval
   std::vector<LandingTarget> landing_targets;
   std::vector<Statustext> texts;
   std::optional<Timesync> answer;  // the last to a question of the autopilot's
@@ -181,6 +182,7 @@ class FakeAutopilot {
       version.flight_sw_version = 0x04060000;
       send(version, now_ns);
     } else if (command.command == mav_command::kSetMessageInterval) {
+      ++intervals[id];
       if (deaf_requests > 0) {
         --deaf_requests;
         return;

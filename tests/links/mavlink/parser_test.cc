@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "links/mavlink/messages.h"
+#include "perch/links/mavlink/crc.h"
 #include "perch/links/mavlink/messages.h"
 
 namespace perch::mavlink {
@@ -158,6 +159,39 @@ TEST(FrameParser, AnUnknownMessageBetweenOthersIsSkippedAsAWhole) {
   EXPECT_EQ(parser.statistics().skipped_bytes, 0u);
   EXPECT_EQ(parser.statistics().sources.at({1, 1}).lost, 0u);
   EXPECT_EQ(parser.statistics().sources.at({1, 1}).received, 3u);
+}
+
+TEST(FrameParser, WhatLooksLikeAnUnknownMessageOutOfStepIsSearched) {
+  FrameParser parser;
+  Bytes stream = heartbeat_frame(1);
+  stream.push_back(0);  // a byte too many: what follows is no frame
+  append(stream, unknown_frame(2, heartbeat_frame(2)));
+  append(stream, heartbeat_frame(3));
+  EXPECT_EQ(parsed(parser, stream).size(), 3u);
+  EXPECT_EQ(parser.statistics().unknown, 0u);
+}
+
+TEST(FrameParser, Mavlink1HasNoExtensionsWhateverItsSenderAppends) {
+  LandingTarget target;
+  target.distance = 7;
+  target.x = 5;
+  target.position_valid = 1;
+  std::array<uint8_t, kMaxPayload> payload{};
+  const MessageInfo& info = *find_message(LandingTarget::kId);
+  write_payload(info, &target, payload);
+  Bytes wire;
+  for (const int byte : {0xFE, 60, 0, 1, 191, 149}) wire.push_back(static_cast<uint8_t>(byte));
+  for (size_t i = 0; i < 60; ++i) wire.push_back(payload[i]);
+  const uint16_t crc = crc_add(crc_add(kCrcStart, std::span(wire).subspan(1)), info.crc_extra);
+  wire.push_back(static_cast<uint8_t>(crc & 0xFF));
+  wire.push_back(static_cast<uint8_t>(crc >> 8));
+  FrameParser parser;
+  const auto frames = parsed(parser, wire);
+  ASSERT_EQ(frames.size(), 1u);
+  const auto received = decode<LandingTarget>(frames[0]);
+  EXPECT_EQ(received->distance, 7);
+  EXPECT_EQ(received->x, 0);
+  EXPECT_EQ(received->position_valid, 0);
 }
 
 TEST(FrameParser, CountsGapsOfTheSequenceForEachSource) {

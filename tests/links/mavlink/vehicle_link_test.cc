@@ -99,8 +99,10 @@ TEST(VehicleLink, DoesNotPesterAnAutopilotThatHasNoSuchStream) {
   world.autopilot.unsupported = {DistanceSensor::kId};
   world.run(50);
   EXPECT_TRUE(world.link.streams().refused(DistanceSensor::kId));
-  // Five streams, one request each, one version and some retries for what was slow to come.
-  EXPECT_LT(world.autopilot.heard[CommandLong::kId], 12);
+  EXPECT_EQ(world.autopilot.intervals[DistanceSensor::kId], 1);
+  EXPECT_EQ(world.autopilot.intervals[AttitudeQuaternion::kId], 1);
+  world.run(30);
+  EXPECT_EQ(world.autopilot.intervals[DistanceSensor::kId], 2);  // after a minute, should it have been mended
 }
 
 TEST(VehicleLink, KeepsTheAttitudeOnOurClock) {
@@ -169,6 +171,25 @@ TEST(VehicleLink, ARebootBetweenTwoHeartbeatsIsNoticedByTheClock) {
   }
   EXPECT_EQ(world.link.clock().statistics().steps, 1u);
   EXPECT_TRUE(world.link.history().attitude_at(world.now_ns - 50 * kMs));
+}
+
+TEST(VehicleLink, AfterASmallStepOfTheClockNothingOfItsTimeIsLeft) {
+  for (const int64_t step : {200 * kMs, 15 * kMs, -200 * kMs}) {
+    LinkedWorld world;
+    world.autopilot.motion = swing;
+    world.autopilot.delay_ms = world.autopilot.jitter_ms = 0.5;
+    world.run(20);
+    world.autopilot.booted_ns += step;
+    world.run(1);  // half a second to the next question, two quick ones
+    EXPECT_EQ(world.link.clock().statistics().steps, 1u) << step;
+    for (int64_t ago = 20 * kMs; ago < 2 * kSecond; ago += 3 * kMs) {
+      const int64_t then = world.now_ns - ago;
+      if (const auto attitude = world.link.history().attitude_at(then)) {
+        EXPECT_LT(attitude->ned_from_body.angularDistance(swing(then).ned_from_body.rotation), 3e-3) << ago;
+      }
+    }
+    EXPECT_TRUE(world.link.history().attitude_at(world.now_ns - 20 * kMs));
+  }
 }
 
 TEST(VehicleLink, AnswersAQuestionForTheTimeAtTheNextTick) {

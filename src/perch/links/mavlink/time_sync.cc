@@ -31,7 +31,7 @@ constexpr size_t kContradictionsOfAStep = 3;
 }  // namespace
 
 std::optional<Timesync> TimeSync::ask(int64_t now_ns) {
-  const int64_t period = samples_.size() < kFewSamples ? kAskFast : kAskSlow;
+  const int64_t period = samples_.size() < kFewSamples || doubtful() ? kAskFast : kAskSlow;
   if (statistics_.asked > 0 && now_ns - last_asked_ns_ < period) return std::nullopt;
   last_asked_ns_ = now_ns;
   asked_ns_[next_asked_] = now_ns;

@@ -40,7 +40,8 @@ struct TimeSyncStatistics {
 // What cannot be seen from here: a way there that is always slower than the way back. `sigma_ns` holds it.
 class TimeSync {
  public:
-  // The question to send now, when one is due: 10 Hz until the estimate is good, then 2 Hz.
+  // The question to send now, when one is due: 10 Hz until the estimate is good, or when it is doubtful, then
+  // 2 Hz.
   std::optional<Timesync> ask(int64_t now_ns);
 
   // Takes an answer in; gives the reply to a question.
@@ -48,6 +49,10 @@ class TimeSync {
 
   // Empty until three answers came, or when the last is so long ago that the clocks may have drifted apart.
   std::optional<ClockEstimate> estimate(int64_t now_ns) const;
+
+  // The last answer contradicted the estimate. It is asked again quickly; until then no new stamp should be
+  // believed.
+  bool doubtful() const { return !contradicting_.empty(); }
 
   // Times of the remote clock on ours; empty without an estimate at `now_ns`.
   std::optional<int64_t> local_from_remote(int64_t remote_ns, int64_t now_ns) const;

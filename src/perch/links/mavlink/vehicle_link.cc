@@ -13,9 +13,9 @@ constexpr int64_t kLostAfter = 3'500 * kMs;
 constexpr int64_t kHeartbeatPeriod = kSecond;
 // The bytes of one frame follow each other; what has not come by then does not come.
 constexpr int64_t kFrameWithin = 200 * kMs;
-// A sample from this far ahead of its arrival, or behind it, has a wrong time: clocks are matched to some ms,
-// and no link holds a message for seconds.
-constexpr int64_t kAhead = 20 * kMs, kBehind = 2 * kSecond;
+// A sample from this far ahead of its arrival, or behind it, has a wrong time, or is of no use any more:
+// clocks are matched to some ms, and links that land aircraft take tens.
+constexpr int64_t kAhead = 20 * kMs, kBehind = 300 * kMs;
 constexpr int64_t kVersionPeriod = 2 * kSecond;
 constexpr size_t kMaxTexts = 64;
 
@@ -204,7 +204,7 @@ void VehicleLink::handle_timesync(const Timesync& message, const Frame& frame, i
 }
 
 std::optional<int64_t> VehicleLink::plausible(std::optional<int64_t> time_ns, int64_t arrival_ns) {
-  if (!time_ns) {
+  if (!time_ns || clock_.doubtful()) {
     ++statistics_.times_unknown;
     return std::nullopt;
   }
