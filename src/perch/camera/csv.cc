@@ -60,6 +60,13 @@ std::optional<double> parse_finite(std::string_view text) {
 
 std::optional<int64_t> parse_integer(std::string_view text) { return parse<int64_t>(text); }
 
+std::string quoted(std::string_view field) {
+  constexpr size_t kShown = 40;
+  std::string text = "\"";
+  for (const char c : field.substr(0, kShown)) text += ' ' <= c && c <= '~' && c != '"' ? c : '?';
+  return text + (field.size() > kShown ? "...\"" : "\"");
+}
+
 CsvReader::CsvReader(const fs::path& file) : file_(file) {
   std::ifstream stream(file, std::ios::binary);
   std::error_code ignored;

@@ -16,6 +16,10 @@ std::optional<double> parse_finite(std::string_view text);
 // A whole number without exponent: nanoseconds since 1970 do not fit a double.
 std::optional<int64_t> parse_integer(std::string_view text);
 
+// A field of a file for a message: in quotes, its first 40 bytes, "?" for what is no printable ASCII. A
+// binary file may be one line.
+std::string quoted(std::string_view field);
+
 // A column that a table must have, as docs/FORMATS.md writes it: "p_x [m]".
 using ColumnName = std::string_view;
 

@@ -83,8 +83,8 @@ std::vector<Picture> read_rows(const fs::path& cam0, bool video, std::vector<std
     const auto fields = csv.fields();
     const auto time = parse_integer(fields[0]);
     if (!time) {
-      problems.push_back(csv.place() + ": timestamp: expected whole nanoseconds, found \"" +
-                         std::string(fields[0]) + "\", row skipped");
+      problems.push_back(csv.place() + ": timestamp: expected whole nanoseconds, found " + quoted(fields[0]) +
+                         ", row skipped");
     } else if (!video && (fields.size() < 2 || fields[1].empty())) {
       problems.push_back(csv.place() + ": filename: found none, row skipped");
     } else {

@@ -43,8 +43,7 @@ class Row {
   T checked(std::optional<T> value, const char* expected) {
     if (value) return *value;
     const std::string& name = names_[--next_];
-    throw std::runtime_error(name + ": expected " + expected + ", found \"" + std::string(text()) +
-                             "\", row skipped");
+    throw std::runtime_error(name + ": expected " + expected + ", found " + quoted(text()) + ", row skipped");
   }
 
   std::span<const std::string_view> fields_;

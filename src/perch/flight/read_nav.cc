@@ -21,6 +21,10 @@ constexpr std::array<ColumnName, 11> kEurocColumns{
     "v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]"};
 constexpr std::array<ColumnName, 4> kGimbalColumns{"timestamp [ns]", "pan [rad]", "tilt [rad]", "zoom []"};
 
+// A position beyond is none: the earth's own radius, of an earth-centred world, is 6.4e6 m. One such row
+// would be all that a flight's errors show.
+constexpr double kMostNumber = 1e8;
+
 constexpr size_t kPoseColumns = 8;  // the velocities, which may be missing, come after them
 
 // The row's time and numbers (NaN where there is none from `required` on), or why it has none.
@@ -30,13 +34,16 @@ std::string read_row(const CsvReader& csv, std::span<const ColumnName> names, st
   const auto field = [&](size_t i) {
     return columns[i] < fields.size() ? fields[columns[i]] : std::string_view{};
   };
-  const auto found = [&](size_t i) { return ", found \"" + std::string(field(i)) + "\", row skipped"; };
+  const auto found = [&](size_t i) { return ", found " + quoted(field(i)) + ", row skipped"; };
   const auto integer = parse_integer(field(0));
   if (!integer) return "timestamp: expected whole nanoseconds" + found(0);
   time = *integer;
   for (size_t i = 1; i < columns.size(); ++i) {
     const auto number = parse_finite(field(i));
     if (!number && i < required) return std::string(names[i]) + ": expected a number" + found(i);
+    if (number && std::abs(*number) > kMostNumber && i < required) {
+      return std::string(names[i]) + ": expected a number within 1e8" + found(i);
+    }
     numbers[i - 1] = number.value_or(std::numeric_limits<double>::quiet_NaN());
   }
   return "";
