@@ -81,6 +81,41 @@ TEST(Score, NeesOfABoastIsAbove) {
   EXPECT_GT(score.consistency.mean_nees, 3 * score.consistency.upper);
 }
 
+TEST(Score, NavigationsNoiseIsNotVisionsWhereThereIsTruth) {
+  TestRng rng;
+  FlightResult result = make_flight({.frames = 500, .noise = 0.01}, rng);
+  result.flight.truth = result.flight.nav;
+  for (NavSample& sample : result.flight.nav.samples) sample.world_from_body.translation += rng.normal3(0.05);
+  const FlightScore score = score_flight(result);
+  ASSERT_TRUE(score.truth);
+  EXPECT_TRUE(score.consistency.by_truth);
+  EXPECT_EQ(score.truth->position.count, 500u);
+  // Three axes of 1 cm; an RMS of N samples of 3 components scatters by 1 / sqrt(6 N), here 1.8 %: four of
+  // them.
+  EXPECT_NEAR(score.truth->position.rms, 0.01 * std::sqrt(3), 0.073 * 0.01 * std::sqrt(3));
+  EXPECT_GT(score.position.rms, 0.08);
+  EXPECT_NEAR(score.consistency.mean_nees, 6, 2 * (score.consistency.upper - 6));
+
+  // Without it navigation's noise is in the number, and the score says so.
+  result.flight.truth.samples.clear();
+  const FlightScore by_navigation = score_flight(result);
+  EXPECT_FALSE(by_navigation.truth);
+  EXPECT_FALSE(by_navigation.consistency.by_truth);
+  EXPECT_GT(by_navigation.consistency.mean_nees, 10 * 6);
+}
+
+TEST(Score, TruthIsOnTheCamerasClock) {
+  TestRng rng;
+  FlightResult result = make_flight({.frames = 50}, rng);
+  result.flight.truth = result.flight.nav;
+  result.chain.time_offset = 0.1;  // navigation's clock is another, and here it is not
+  for (NavSample& sample : result.flight.nav.samples) sample.timestamp_ns -= 100'000'000;
+  const FlightScore score = score_flight(result);
+  ASSERT_TRUE(score.truth);
+  EXPECT_LE(score.truth->position.max, 64 * kEpsilon * 10);
+  EXPECT_LE(score.position.max, 64 * kEpsilon * 10);
+}
+
 TEST(Score, SigmasOfTheAnglesAreThoseOfSamples) {
   TestRng rng;
   UncertainRigid3 pose{{rotation_from_ypr({0.4, 0.7, -2}), {1, 2, 3}}, PoseCovariance::Zero()};

@@ -113,6 +113,18 @@ TEST(ErrorTable, ShowsCentimetresAndDegreesInColumns) {
   EXPECT_THAT(table, HasSubstr("yaw          1.000 deg     +1.000 deg      0.000 deg      1.000 deg\n"));
 }
 
+TEST(ErrorTable, CallsNeesHonestAgainstTruthOnly) {
+  TestRng rng;
+  FlightResult flight = make_flight({.frames = 10, .noise = 0.01}, rng);
+  EXPECT_THAT(error_table(score_flight(flight)),
+              HasSubstr(", with navigation's noise counted as vision's\n"));
+  flight.flight.truth = flight.flight.nav;
+  const std::string table = error_table(score_flight(flight));
+  EXPECT_THAT(table, HasSubstr("  against the flight's truth: position "));
+  EXPECT_THAT(table, HasSubstr(", honest within "));
+  EXPECT_EQ(summary_json(score_flight(flight))["consistency"]["reference"], "truth");
+}
+
 TEST(ErrorTable, SaysWhyThereIsNone) {
   TestRng rng;
   FlightResult flight = make_flight({.frames = 10}, rng);

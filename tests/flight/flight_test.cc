@@ -179,8 +179,51 @@ TEST(Flight, EurocsTruthStandsInForNav) {
   ASSERT_EQ(samples.size(), 1U);
   EXPECT_EQ(samples[0].timestamp_ns, 1403636580838555648);
   EXPECT_EQ(samples[0].body_velocity_in_world.z(), 0.800006);
+  EXPECT_TRUE(folder.read().nav_is_truth);
+  EXPECT_THAT(folder.read().truth.samples, IsEmpty());
+}
+
+TEST(Flight, TruthLiesBesideNav) {
+  const FlightFolder folder;
+  folder.write("mav0/nav0/data.csv", kNavHeader + "7,1,2,3,1,0,0,0,0,0,0\n");
+  folder.write("mav0/state_groundtruth_estimate0/data.csv",
+               "#timestamp,p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],"
+               "v_RS_R_x [m s^-1],v_RS_R_y [m s^-1],v_RS_R_z [m s^-1]\n8,4,5,6,1,0,0,0,0,0,0\n");
+  const Flight flight = folder.read();
+  EXPECT_FALSE(flight.nav_is_truth);
+  ASSERT_EQ(flight.nav.samples.size(), 1U);
+  EXPECT_EQ(flight.nav.samples[0].timestamp_ns, 7);
+  ASSERT_EQ(flight.truth.samples.size(), 1U);
+  EXPECT_EQ(flight.truth.samples[0].world_from_body.translation, Eigen::Vector3d(4, 5, 6));
+}
+
+TEST(Flight, AnEmptyNavIsNotReplacedByTruth) {
+  const FlightFolder folder;
   folder.write("mav0/nav0/data.csv", kNavHeader);
+  folder.write("mav0/state_groundtruth_estimate0/data.csv", kNavHeader + "8,4,5,6,1,0,0,0,0,0,0\n");
   EXPECT_THAT(folder.read().nav.samples, IsEmpty());
+  EXPECT_FALSE(folder.read().nav_is_truth);
+}
+
+TEST(Flight, RefusesPlacesThatNoVehicleHas) {
+  const FlightFolder folder;
+  folder.write("mav0/nav0/data.csv", kNavHeader +
+                                         "1,1e300,0,0,1,0,0,0,0,0,0\n"
+                                         "2,0,-2e8,0,1,0,0,0,0,0,0\n"
+                                         "4,0,0,6.4e6,1,0,0,0.02,0,0,0\n");
+  EXPECT_EQ(folder.read().nav.samples.size(), 1U);
+  EXPECT_THAT(
+      folder.problems(),
+      ElementsAre("nav0/data.csv:2: p_x [m]: expected a number within 1e8, found \"1e300\", row skipped",
+                  "nav0/data.csv:3: p_y [m]: expected a number within 1e8, found \"-2e8\", row skipped"));
+}
+
+TEST(Flight, QuotesOfBytesWhatALineHolds) {
+  const FlightFolder folder;
+  folder.write("mav0/nav0/data.csv", kNavHeader + std::string("\x01\xff\"") + std::string(500, 'x') + ",0\n");
+  EXPECT_THAT(folder.problems(),
+              ElementsAre("nav0/data.csv:2: timestamp: expected whole nanoseconds, found \"???" +
+                          std::string(37, 'x') + "...\", row skipped"));
 }
 
 TEST(Flight, GimbalAnglesAreInRadians) {

@@ -29,6 +29,14 @@ std::string size_row(const std::string& name, const Statistics& s, double shown_
                 s.max * shown_per_si, unit);
 }
 
+// Against navigation there is no verdict: its noise, mostly larger than vision's, is in the number.
+std::string consistency_row(const Consistency& c) {
+  if (c.count == 0) return "";
+  if (!c.by_truth)
+    return format("  mean NEES %.2f, with navigation's noise counted as vision's\n", c.mean_nees);
+  return format("  mean NEES %.2f, honest within %.2f to %.2f\n", c.mean_nees, c.lower, c.upper);
+}
+
 }  // namespace
 
 std::string error_table(const FlightScore& score) {
@@ -48,12 +56,14 @@ std::string error_table(const FlightScore& score) {
   }
   table += size_row("position", score.position, kCmFromM, "cm");
   table += size_row("rotation", score.rotation, kDegFromRad, "deg");
-  table += format("  position over range %.3f %%", 100 * score.relative_position_rms);
-  if (score.consistency.count > 0) {
-    table += format("; mean NEES %.2f, honest within %.2f to %.2f", score.consistency.mean_nees,
-                    score.consistency.lower, score.consistency.upper);
+  table += format("  position over range %.3f %%\n", 100 * score.relative_position_rms);
+  if (score.truth) {
+    table +=
+        format("  against the flight's truth: position %.3f cm, %.3f %% of the range, rotation %.3f deg\n",
+               score.truth->position.rms * kCmFromM, 100 * score.truth->relative_position_rms,
+               score.truth->rotation.rms * kDegFromRad);
   }
-  return table + "\n";
+  return table + consistency_row(score.consistency);
 }
 
 }  // namespace perch

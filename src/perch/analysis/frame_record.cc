@@ -31,18 +31,18 @@ SixStates six_sigmas(const UncertainRigid3& pad_from_body) {
   return sigmas.cwiseSqrt();
 }
 
-FrameError frame_error(const UncertainRigid3& vision, const Rigid3& navigation) {
+FrameError frame_error(const UncertainRigid3& vision, const Rigid3& reference) {
   FrameError error;
-  error.difference = six_states(vision.mean) - six_states(navigation);
+  error.difference = six_states(vision.mean) - six_states(reference);
   for (int i = 3; i < 6; ++i) error.difference[i] = wrap_angle(error.difference[i]);
   error.position = error.difference.head<3>().norm();
-  error.rotation = vision.mean.rotation.angularDistance(navigation.rotation);
-  const double nees = normalised_error_squared(pose_error(vision.mean, navigation), vision.covariance);
+  error.rotation = vision.mean.rotation.angularDistance(reference.rotation);
+  const double nees = normalised_error_squared(pose_error(vision.mean, reference), vision.covariance);
   if (std::isfinite(nees)) error.nees = nees;
   return error;
 }
 
-FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain, const NavTrack& nav) {
+FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain, const Flight& flight) {
   FrameRecord record;
   record.timestamp_ns = estimate.timestamp_ns;
   record.status = estimate.status;
@@ -50,7 +50,7 @@ FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain,
   record.ambiguity = estimate.ambiguity;
 
   std::optional<Rigid3> navigation;
-  if (const auto sample = nav.at(navigation_time_ns(chain, estimate.timestamp_ns))) {
+  if (const auto sample = flight.nav.at(navigation_time_ns(chain, estimate.timestamp_ns))) {
     navigation = pad_from_body_by_navigation(chain, sample->world_from_body);
   }
   if (navigation) record.navigation = six_states(*navigation);
@@ -65,6 +65,10 @@ FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain,
   record.vision = states;
   record.sigma = six_sigmas(vision);
   if (navigation) record.error = frame_error(vision, *navigation);
+  if (const auto sample = flight.truth.at(estimate.timestamp_ns)) {
+    const auto truth = pad_from_body_by_navigation(chain, sample->world_from_body);
+    if (truth) record.truth_error = frame_error(vision, *truth);
+  }
   return record;
 }
 

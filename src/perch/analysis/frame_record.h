@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "perch/estimator/estimate.h"
-#include "perch/flight/nav_track.h"
+#include "perch/flight/flight.h"
 #include "perch/frames/frame_chain.h"
 
 namespace perch {
@@ -25,13 +25,13 @@ SixStates six_states(const Rigid3& pad_from_body);
 // rotation can be any change of yaw and roll.
 SixStates six_sigmas(const UncertainRigid3& pad_from_body);
 
-// How far vision is from navigation.
+// How far vision is from a reference: navigation, or the flight's own truth.
 struct FrameError {
-  SixStates difference = SixStates::Zero();  // vision minus navigation; angles wrapped to (-pi, pi]
+  SixStates difference = SixStates::Zero();  // vision minus reference; angles wrapped to (-pi, pi]
   double position = 0;                       // length of the position's difference, m
   double rotation = 0;  // angle between the two attitudes, rad: free of the ZYX angles' pole
   // Normalised error squared of position and rotation under vision's covariance; empty when that is not
-  // positive definite. Navigation's own noise is not in it: NEES above 6 may be navigation's fault.
+  // positive definite. The reference's own noise is not in it: against navigation it counts as vision's.
   std::optional<double> nees;
 };
 
@@ -50,10 +50,19 @@ struct FrameRecord {
   std::optional<SixStates> navigation;
   // Where both are:
   std::optional<FrameError> error;
+  // Where the flight holds its exact truth beside navigation:
+  std::optional<FrameError> truth_error;
 };
 
-FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain, const NavTrack& nav);
+FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain, const Flight& flight);
 
-FrameError frame_error(const UncertainRigid3& vision, const Rigid3& navigation);
+// The frame's normalised error squared against the truth, or against navigation.
+inline std::optional<double> nees_of(const FrameRecord& frame, bool against_truth) {
+  const auto& error = against_truth ? frame.truth_error : frame.error;
+  return error ? error->nees : std::nullopt;
+}
+
+// `reference` is the body in the pad frame, by navigation or truth.
+FrameError frame_error(const UncertainRigid3& vision, const Rigid3& reference);
 
 }  // namespace perch

@@ -88,8 +88,9 @@ Json frames_json(const FlightScore& score) {
                                      return f.error ? short_number(100 * f.error->position) : Json(nullptr);
                                    })},
       {"nees", column(frames,
-                      [](const FrameRecord& f) {
-                        return f.error && f.error->nees ? short_number(*f.error->nees) : Json(nullptr);
+                      [&](const FrameRecord& f) {
+                        const auto nees = nees_of(f, score.truth.has_value());
+                        return nees ? short_number(*nees) : Json(nullptr);
                       })},
       {"range_m", column(frames, [](const FrameRecord& f) { return rounded(f.range, kMillisecond); })},
       {"reprojection_px",

@@ -52,13 +52,14 @@ std::vector<DistanceBin> bin_by_distance(const std::vector<const FrameRecord*>& 
   return bins;
 }
 
-Consistency check_consistency(const std::vector<const FrameRecord*>& compared) {
+Consistency check_consistency(std::span<const std::optional<double>> nees_of_frames, bool by_truth) {
   Consistency consistency;
+  consistency.by_truth = by_truth;
   double sum = 0;
   size_t inside = 0;
-  for (const FrameRecord* frame : compared) {
-    if (!frame->error->nees) continue;
-    const double nees = *frame->error->nees;
+  for (const auto& of_frame : nees_of_frames) {
+    if (!of_frame) continue;
+    const double nees = *of_frame;
     ++consistency.count;
     sum += nees;
     if (kNeesLower <= nees && nees <= kNeesUpper) ++inside;
@@ -98,6 +99,18 @@ void score_errors(const std::vector<const FrameRecord*>& compared, FlightScore& 
   score.relative_position_rms = statistics(relative).rms;
 }
 
+std::optional<TruthScore> score_truth(const std::vector<FrameRecord>& frames) {
+  std::vector<double> position, rotation, relative;
+  for (const FrameRecord& frame : frames) {
+    if (!frame.truth_error) continue;
+    position.push_back(frame.truth_error->position);
+    rotation.push_back(frame.truth_error->rotation);
+    if (frame.range > 0) relative.push_back(frame.truth_error->position / frame.range);
+  }
+  if (position.empty()) return std::nullopt;
+  return TruthScore{statistics(position), statistics(rotation), statistics(relative).rms};
+}
+
 }  // namespace
 
 const char* to_string(Comparison comparison) {
@@ -125,7 +138,7 @@ FlightScore score_flight(const FlightResult& result) {
 
   score.frames.reserve(result.estimates.size());
   for (const Estimate& estimate : result.estimates) {
-    score.frames.push_back(make_frame_record(estimate, result.chain, result.flight.nav));
+    score.frames.push_back(make_frame_record(estimate, result.chain, result.flight));
     if (!estimate.problem.empty()) score.problems.push_back(estimate.problem);
   }
   std::vector<const FrameRecord*> compared;
@@ -137,7 +150,10 @@ FlightScore score_flight(const FlightResult& result) {
   score.comparison = comparison_of(result, !compared.empty());
   score_errors(compared, score);
   score.bins = bin_by_distance(compared);
-  score.consistency = check_consistency(compared);
+  score.truth = score_truth(score.frames);
+  std::vector<std::optional<double>> nees;
+  for (const FrameRecord& frame : score.frames) nees.push_back(nees_of(frame, score.truth.has_value()));
+  score.consistency = check_consistency(nees, score.truth || result.flight.nav_is_truth);
   score.reprojection_px = statistics(reprojection_px);
   score.detections = count_detections(score.frames);
   score.costs = measure_stage_costs(result.estimates);

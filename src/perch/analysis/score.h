@@ -35,6 +35,9 @@ struct DistanceBin {
 // How honest vision's covariance is. The mean NEES of N independent frames with an honest covariance is 6 and
 // lies within the bounds 95 times of 100: 6 N chi-square degrees of freedom over N.
 struct Consistency {
+  // Against the flight's exact truth where it holds one. Else against navigation, whose own noise then counts
+  // as vision's: a mean NEES far above 6 says no more than that navigation is the noisier.
+  bool by_truth = false;
   size_t count = 0;
   double mean_nees = std::numeric_limits<double>::quiet_NaN();
   double lower = std::numeric_limits<double>::quiet_NaN(), upper = std::numeric_limits<double>::quiet_NaN();
@@ -48,6 +51,13 @@ inline constexpr double kNeesUpper = 14.4494;  // 97.5 %
 enum class Comparison { kCompared, kNoNavigation, kNoWorldFromPad, kNoCommonTime };
 const char* to_string(Comparison comparison);
 
+// The errors against the flight's exact truth, of a flight that has navigation too.
+struct TruthScore {
+  Statistics position;  // of the distances, m
+  Statistics rotation;  // of the angles between the attitudes, rad
+  double relative_position_rms = std::numeric_limits<double>::quiet_NaN();  // of position error over range
+};
+
 struct FlightScore {
   std::string name, target;
   std::vector<FrameRecord> frames;
@@ -60,6 +70,7 @@ struct FlightScore {
   Statistics rotation;               // of the angles between the attitudes, rad
   double relative_position_rms = std::numeric_limits<double>::quiet_NaN();  // of position error over range
   std::vector<DistanceBin> bins;
+  std::optional<TruthScore> truth;
   Consistency consistency;
 
   Statistics reprojection_px;

@@ -74,11 +74,20 @@ Json bins_json(const std::vector<DistanceBin>& bins) {
 }
 
 Json consistency_json(const Consistency& c) {
-  return {{"frames", c.count},
+  return {{"reference", c.by_truth ? "truth" : "navigation"},
+          {"frames", c.count},
           {"mean_nees", number(c.mean_nees)},
           {"expected_nees", 6},
           {"mean_nees_bounds_95", {number(c.lower), number(c.upper)}},
           {"fraction_of_frames_inside_95", number(c.fraction_inside)}};
+}
+
+Json truth_json(const std::optional<TruthScore>& truth) {
+  if (!truth) return nullptr;
+  return {{"frames", truth->position.count},
+          {"position_m", size_json(truth->position)},
+          {"rotation_rad", size_json(truth->rotation)},
+          {"position_over_range_rms", number(truth->relative_position_rms)}};
 }
 
 Json stages_json(const StageCosts& costs) {
@@ -127,6 +136,7 @@ nlohmann::ordered_json summary_json(const FlightScore& score) {
           {"compared_frames", compared},
           {"errors", errors_json(score)},
           {"distance_bins", bins_json(score.bins)},
+          {"truth", truth_json(score.truth)},
           {"consistency", consistency_json(score.consistency)},
           {"reprojection_rms_px", size_json(score.reprojection_px)},
           {"stages", stages_json(score.costs)},

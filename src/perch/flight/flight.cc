@@ -78,8 +78,13 @@ Flight read_flight(const fs::path& folder) {
   read_camera(mav0 / "cam0", flight);
 
   const fs::path nav0 = mav0 / "nav0" / "data.csv", truth = mav0 / "state_groundtruth_estimate0" / "data.csv";
-  const fs::path nav = is_there(nav0) ? nav0 : truth;
-  if (is_there(nav)) attempt(flight.problems, [&] { flight.nav = read_nav(nav, flight.problems); });
+  const bool has_nav = is_there(nav0), has_truth = is_there(truth);
+  if (has_nav) attempt(flight.problems, [&] { flight.nav = read_nav(nav0, flight.problems); });
+  if (has_truth) {
+    attempt(flight.problems,
+            [&] { (has_nav ? flight.truth : flight.nav) = read_nav(truth, flight.problems); });
+  }
+  flight.nav_is_truth = has_truth && !has_nav;
   const fs::path gimbal = mav0 / "gimbal0" / "data.csv";
   if (is_there(gimbal))
     attempt(flight.problems, [&] { flight.gimbal = read_gimbal(gimbal, flight.problems); });

@@ -25,7 +25,9 @@ struct Flight {
   std::string name;                   // its last part
   std::optional<CameraModel> camera;  // camera.cameramodel, else sensor.yaml; absent when neither can be read
   std::optional<Rigid3> body_from_camera;  // sensor.yaml's T_BS
-  NavTrack nav;  // nav0, else state_groundtruth_estimate0; empty when there is neither
+  NavTrack nav;               // nav0, else state_groundtruth_estimate0; empty when there is neither
+  bool nav_is_truth = false;  // nav is the latter
+  NavTrack truth;             // state_groundtruth_estimate0 beside nav0, on the camera's clock; or empty
   std::vector<GimbalSample> gimbal;
   std::vector<std::string> problems;  // "file:line: what", each thing that was skipped
 };
