@@ -40,15 +40,23 @@ class TimeGroup {
   }
 }
 
-// Shades the frames without a pose behind the lines: from one frame to the next.
+// The time that each frame stands for: halfway to its neighbours, so that the first and the last have some too, but
+// not far into a time without frames.
+function spansOf(times) {
+  const most = times.length > 1 ? 1.5 * (times[times.length - 1] - times[0]) / (times.length - 1) : 0.5;
+  return times.map((time, i) => [
+    time - Math.min(most, i > 0 ? (time - times[i - 1]) / 2 : most),
+    time + Math.min(most, i + 1 < times.length ? (times[i + 1] - time) / 2 : most)]);
+}
+
+// Shades the frames without a pose behind the lines.
 function shadeGaps(times, status) {
   const gaps = [];
-  for (let i = 0; i < status.length; ++i) {
-    if (status[i] === '0') continue;
-    const end = times[Math.min(i + 1, times.length - 1)];
-    if (gaps.length && gaps[gaps.length - 1][1] >= times[i]) gaps[gaps.length - 1][1] = end;
-    else gaps.push([times[i], end]);
-  }
+  spansOf(times).forEach(([from, to], i) => {
+    if (status[i] === '0') return;
+    if (gaps.length && gaps[gaps.length - 1][1] >= from) gaps[gaps.length - 1][1] = to;
+    else gaps.push([from, to]);
+  });
   return (plot) => {
     const {ctx, bbox} = plot;
     ctx.save();
@@ -118,7 +126,7 @@ function timePlot(parent, group, {label, series, bands, data, height = 210, scal
   return plot;
 }
 
-// The frames' statuses as a strip of colours. A frame lasts until the next one; the worse status wins a pixel.
+// The frames' statuses as a strip of colours; the worse status wins a pixel.
 function statusStrip(parent, group, times, status) {
   const drawOver = (plot) => {
     const {ctx, bbox} = plot;
@@ -126,14 +134,13 @@ function statusStrip(parent, group, times, status) {
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    const typical = times.length > 1 ? (times[times.length - 1] - times[0]) / (times.length - 1) : 1;
+    const spans = spansOf(times);
     for (let pass = 0; pass < 2; ++pass) {  // the few that failed over the many that did not
       for (let i = 0; i < status.length; ++i) {
         if ((status[i] === '0') !== (pass === 0)) continue;
-        const end = i + 1 < times.length ? Math.min(times[i + 1], times[i] + 3 * typical) : times[i] + typical;
         // Whole pixels: two half-covered ones would let the page shine through between frames.
-        const x0 = Math.floor(plot.valToPos(times[i], 'x', true));
-        const x1 = Math.ceil(plot.valToPos(end, 'x', true));
+        const x0 = Math.floor(plot.valToPos(spans[i][0], 'x', true));
+        const x1 = Math.ceil(plot.valToPos(spans[i][1], 'x', true));
         ctx.fillStyle = statusColour(+status[i]);
         ctx.fillRect(x0, bbox.top, Math.max(1, x1 - x0), bbox.height);
       }
