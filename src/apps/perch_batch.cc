@@ -106,8 +106,8 @@ class Progress {
 };
 
 struct Outcome {
-  std::optional<ReportFlight> flight;
-  std::string error;
+  std::optional<ReportFlight> flight;  // absent: interrupted
+  bool failed = true;
 };
 
 std::vector<Outcome> run_all(const RunConfig& config, const std::vector<fs::path>& flights,
@@ -121,11 +121,12 @@ std::vector<Outcome> run_all(const RunConfig& config, const std::vector<fs::path
     try {
       outcomes[i].flight =
           run_flight({config, flights[i], folders[i], stop_requested, [&] { progress.frame(); }});
+      outcomes[i].failed = false;
       progress.flight(flights[i].string() + ": done");
     } catch (const Interrupted&) {
     } catch (const std::exception& e) {
-      outcomes[i].error = e.what();
-      progress.flight("perch-batch: " + outcomes[i].error);
+      outcomes[i].flight = ReportFlight{failed_flight(folders[i].filename().string(), e.what()), {}};
+      progress.flight(std::string("perch-batch: ") + e.what());
     }
   });
   return outcomes;
@@ -162,16 +163,18 @@ int run(const CommandLine& line) {
   const auto outcomes = run_all(config, flights, folders);
 
   std::vector<ReportFlight> done;
+  std::vector<fs::path> estimated;
   bool failed = stop_requested;
-  for (const auto& outcome : outcomes) {
-    failed = failed || !outcome.flight;
-    if (!outcome.flight) continue;
-    done.push_back(*outcome.flight);
-    std::cout << error_table(outcome.flight->score) << '\n';
+  for (size_t i = 0; i < outcomes.size(); ++i) {
+    failed = failed || outcomes[i].failed;
+    if (outcomes[i].flight) done.push_back(*outcomes[i].flight);
+    if (outcomes[i].failed) continue;
+    estimated.push_back(folders[i]);
+    std::cout << error_table(outcomes[i].flight->score) << '\n';
   }
   write_run_files(FLAGS_output, done, root.resolved());
   std::cout << "report: " << (fs::path(FLAGS_output) / "report.html").string() << '\n';
-  if (!FLAGS_compare.empty()) std::cout << '\n' << compare_runs(FLAGS_output, FLAGS_compare, folders);
+  if (!FLAGS_compare.empty()) std::cout << '\n' << compare_runs(FLAGS_output, FLAGS_compare, estimated);
   if (stop_requested)
     std::cerr << "perch-batch: interrupted: what is missing was not begun or not finished\n";
   return failed ? 1 : 0;

@@ -82,6 +82,13 @@ TEST(Summary, CsvHasAsManyFieldsAsItsHeader) {
   }
 }
 
+TEST(Summary, CsvCountsAFlightThatFailed) {
+  const std::string row = summary_csv_row(failed_flight("a", "a: no flight"));
+  EXPECT_EQ(row.rfind("a,not estimated,0,0,", 0), 0u) << row;
+  EXPECT_EQ(columns(row), columns(summary_csv_header()));
+  EXPECT_TRUE(row.ends_with(",1\n")) << row;
+}
+
 TEST(Summary, CsvQuotesANameWithAComma) {
   FlightScore score;
   score.name = "a,\"b\"";

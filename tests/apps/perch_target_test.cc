@@ -1,10 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <cstdlib>
-
-#include "support/temp_folder.h"
+#include "support/run_program.h"
 
 namespace perch {
 namespace {
@@ -15,22 +12,9 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
 class PerchTarget : public testing::Test {
  protected:
-  // Runs perch-target in the test's folder, as a shell would.
-  Outcome run(const std::string& arguments) const {
-    const std::string command =
-        "cd " + folder_.path().string() + " && " + PERCH_TARGET + " " + arguments + " >.out 2>.err";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(folder_ / ".out"),
-            read_file(folder_ / ".err")};
-  }
+  Outcome run(const std::string& arguments) const { return run_program_in(folder_, PERCH_TARGET, arguments); }
   const std::string sharp_ = std::string(PERCH_SOURCE_DIR) + "/configs/targets/sharp.yaml";
   TempFolder folder_;
 };

@@ -98,6 +98,7 @@ function tiles(summary) {
 }
 
 const WHY_NOT_COMPARED = {
+  'not estimated': 'The flight could not be estimated; the problem below says why.',
   'no navigation': 'The flight has no navigation, so there is nothing to compare with: vision alone is shown.',
   'no world_from_pad': 'The configuration has no frames.world_from_pad, so navigation cannot be brought into the pad frame: vision alone is shown.',
 };

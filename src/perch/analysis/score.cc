@@ -123,6 +123,8 @@ const char* to_string(Comparison comparison) {
       return "no world_from_pad";
     case Comparison::kNoCommonTime:
       return "no detected frame within the navigation's time";
+    case Comparison::kNotEstimated:
+      return "not estimated";
   }
   return "";
 }
@@ -157,6 +159,14 @@ FlightScore score_flight(const FlightResult& result) {
   score.reprojection_px = statistics(reprojection_px);
   score.detections = count_detections(score.frames);
   score.costs = measure_stage_costs(result.estimates);
+  return score;
+}
+
+FlightScore failed_flight(const std::string& name, const std::string& problem) {
+  FlightScore score;
+  score.name = name;
+  score.problems = {problem};
+  score.comparison = Comparison::kNotEstimated;
   return score;
 }
 

@@ -48,7 +48,7 @@ inline constexpr double kNeesLower = 1.2373;   // 2.5 % of chi-square with 6 deg
 inline constexpr double kNeesUpper = 14.4494;  // 97.5 %
 
 // Why there are errors, or none.
-enum class Comparison { kCompared, kNoNavigation, kNoWorldFromPad, kNoCommonTime };
+enum class Comparison { kCompared, kNoNavigation, kNoWorldFromPad, kNoCommonTime, kNotEstimated };
 const char* to_string(Comparison comparison);
 
 // The errors against the flight's exact truth, of a flight that has navigation too.
@@ -80,6 +80,9 @@ struct FlightScore {
 
 // Scores a flight. No frame, no navigation, no detection: all are flights, with statistics of nothing.
 FlightScore score_flight(const FlightResult& result);
+
+// What a run's summary and report say of a flight that could not be estimated at all.
+FlightScore failed_flight(const std::string& name, const std::string& problem);
 
 // A frame worth a picture in the report, and why.
 struct ShownFrame {
