@@ -76,7 +76,7 @@ TEST(Score, NeesOfHonestNoiseIsWithinItsBounds) {
 TEST(Score, NeesOfABoastIsAbove) {
   TestRng rng;
   FlightResult result = make_flight({.frames = 200, .noise = 0.05}, rng);
-  for (Estimate& estimate : result.estimates) estimate.pad_from_body->covariance /= 4;
+  for (Estimate& estimate : result.estimates) estimate.camera_from_target.covariance /= 4;
   const FlightScore score = score_flight(result);
   EXPECT_GT(score.consistency.mean_nees, 3 * score.consistency.upper);
 }
@@ -114,6 +114,29 @@ TEST(Score, TruthIsOnTheCamerasClock) {
   ASSERT_TRUE(score.truth);
   EXPECT_LE(score.truth->position.max, 64 * kEpsilon * 10);
   EXPECT_LE(score.position.max, 64 * kEpsilon * 10);
+}
+
+// Far away a tilt's error is an arc in the pad frame; the camera's frame, with a target that lies turned on
+// the pad, knows no such.
+TEST(Score, NeesOfHonestTiltFarAwayIsWithinItsBounds) {
+  TestRng rng;
+  FlightResult result = make_flight({.frames = 2000}, rng);
+  result.chain.target_from_pad = {rotation_from_ypr({0.7, 0, 0}), {0.3, -0.2, 0}};
+  const Rigid3& target_from_pad = result.chain.target_from_pad;
+  PoseError sigmas;
+  sigmas << 0.01, 0.01, 0.02, 0.1, 0.1, 0.01;  // m, rad
+  for (size_t i = 0; i < result.estimates.size(); ++i) {
+    const Rigid3 truth = result.flight.nav.samples[i].world_from_body;  // world is pad, camera is body
+    PoseError error;
+    for (int k = 0; k < 6; ++k) error[k] = rng.normal(sigmas[k]);
+    UncertainRigid3& seen = result.estimates[i].camera_from_target;
+    seen.mean = perturb(inverse(truth) * inverse(target_from_pad), error);
+    seen.covariance = sigmas.cwiseAbs2().asDiagonal();
+    result.estimates[i].pad_from_body = pad_from_body_by_vision(result.chain, seen);
+  }
+  const FlightScore score = score_flight(result);
+  // The bounds of 95 %, doubled in width: four sigma of the mean.
+  EXPECT_NEAR(score.consistency.mean_nees, 6, 2 * (score.consistency.upper - 6));
 }
 
 TEST(Score, SigmasOfTheAnglesAreThoseOfSamples) {

@@ -30,8 +30,8 @@ struct FrameError {
   SixStates difference = SixStates::Zero();  // vision minus reference; angles wrapped to (-pi, pi]
   double position = 0;                       // length of the position's difference, m
   double rotation = 0;  // angle between the two attitudes, rad: free of the ZYX angles' pole
-  // Normalised error squared of position and rotation under vision's covariance; empty when that is not
-  // positive definite. The reference's own noise is not in it: against navigation it counts as vision's.
+  // Normalised error squared of camera_from_target under its covariance; empty when that is not positive
+  // definite. The reference's own noise is not in it: against navigation it counts as vision's.
   std::optional<double> nees;
 };
 
@@ -62,7 +62,7 @@ inline std::optional<double> nees_of(const FrameRecord& frame, bool against_trut
   return error ? error->nees : std::nullopt;
 }
 
-// `reference` is the body in the pad frame, by navigation or truth.
-FrameError frame_error(const UncertainRigid3& vision, const Rigid3& reference);
+// Of an estimate that has pad_from_body. `reference` is the body in the pad frame, by navigation or truth.
+FrameError frame_error(const Estimate& estimate, const FrameChain& chain, const Rigid3& reference);
 
 }  // namespace perch
