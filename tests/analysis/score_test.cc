@@ -137,6 +137,10 @@ TEST(Score, NeesOfHonestTiltFarAwayIsWithinItsBounds) {
   const FlightScore score = score_flight(result);
   // The bounds of 95 %, doubled in width: four sigma of the mean.
   EXPECT_NEAR(score.consistency.mean_nees, 6, 2 * (score.consistency.upper - 6));
+  // sqrt(1 + 1 + 4) cm at 1 to 9 m; the body's own is a tilt of 0.14 rad, some 14 % of the range.
+  EXPECT_GT(score.consistency.seen_over_range_rms, 0.0245 / 9);
+  EXPECT_LT(score.consistency.seen_over_range_rms, 0.0245 / 1);
+  EXPECT_GT(score.relative_position_rms, 0.1);
 }
 
 TEST(Score, SigmasOfTheAnglesAreThoseOfSamples) {

@@ -45,6 +45,7 @@ FrameError frame_error(const Estimate& estimate, const FrameChain& chain, const 
   const UncertainRigid3& seen = estimate.camera_from_target;
   const Rigid3 camera_from_target =
       seen.mean * chain.target_from_pad * vision * inverse(reference) * inverse(chain.target_from_pad);
+  error.seen_position = (seen.mean.translation - camera_from_target.translation).norm();
   const double nees = normalised_error_squared(pose_error(seen.mean, camera_from_target), seen.covariance);
   if (std::isfinite(nees)) error.nees = nees;
   return error;

@@ -30,6 +30,9 @@ struct FrameError {
   SixStates difference = SixStates::Zero();  // vision minus reference; angles wrapped to (-pi, pi]
   double position = 0;                       // length of the position's difference, m
   double rotation = 0;  // angle between the two attitudes, rad: free of the ZYX angles' pole
+  // Of the target's origin as the camera sees it, m: what the picture gives, before the attitude's error
+  // swings the body about the pad.
+  double seen_position = 0;
   // Normalised error squared of camera_from_target under its covariance; empty when that is not positive
   // definite. The reference's own noise is not in it: against navigation it counts as vision's.
   std::optional<double> nees;
@@ -56,10 +59,9 @@ struct FrameRecord {
 
 FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain, const Flight& flight);
 
-// The frame's normalised error squared against the truth, or against navigation.
-inline std::optional<double> nees_of(const FrameRecord& frame, bool against_truth) {
-  const auto& error = against_truth ? frame.truth_error : frame.error;
-  return error ? error->nees : std::nullopt;
+// The frame's error against the truth, or against navigation.
+inline const std::optional<FrameError>& error_of(const FrameRecord& frame, bool against_truth) {
+  return against_truth ? frame.truth_error : frame.error;
 }
 
 // Of an estimate that has pad_from_body. `reference` is the body in the pad frame, by navigation or truth.

@@ -89,8 +89,8 @@ Json frames_json(const FlightScore& score) {
                                    })},
       {"nees", column(frames,
                       [&](const FrameRecord& f) {
-                        const auto nees = nees_of(f, score.truth.has_value());
-                        return nees ? short_number(*nees) : Json(nullptr);
+                        const auto& error = error_of(f, score.truth.has_value());
+                        return error && error->nees ? short_number(*error->nees) : Json(nullptr);
                       })},
       {"range_m", column(frames, [](const FrameRecord& f) { return rounded(f.range, kMillisecond); })},
       {"reprojection_px",

@@ -52,18 +52,23 @@ std::vector<DistanceBin> bin_by_distance(const std::vector<const FrameRecord*>& 
   return bins;
 }
 
-Consistency check_consistency(std::span<const std::optional<double>> nees_of_frames, bool by_truth) {
+// Against the truth where `has_truth`, else against navigation, which may be the truth itself.
+Consistency check_consistency(std::span<const FrameRecord> frames, bool has_truth, bool nav_is_truth) {
   Consistency consistency;
-  consistency.by_truth = by_truth;
+  consistency.by_truth = has_truth || nav_is_truth;
   double sum = 0;
   size_t inside = 0;
-  for (const auto& of_frame : nees_of_frames) {
-    if (!of_frame) continue;
-    const double nees = *of_frame;
+  std::vector<double> seen;
+  for (const FrameRecord& frame : frames) {
+    const auto& error = error_of(frame, has_truth);
+    if (!error) continue;
+    if (frame.range > 0) seen.push_back(error->seen_position / frame.range);
+    if (!error->nees) continue;
     ++consistency.count;
-    sum += nees;
-    if (kNeesLower <= nees && nees <= kNeesUpper) ++inside;
+    sum += *error->nees;
+    if (kNeesLower <= *error->nees && *error->nees <= kNeesUpper) ++inside;
   }
+  consistency.seen_over_range_rms = statistics(seen).rms;
   if (consistency.count == 0) return consistency;
   const auto n = static_cast<double>(consistency.count);
   consistency.mean_nees = sum / n;
@@ -153,9 +158,7 @@ FlightScore score_flight(const FlightResult& result) {
   score_errors(compared, score);
   score.bins = bin_by_distance(compared);
   score.truth = score_truth(score.frames);
-  std::vector<std::optional<double>> nees;
-  for (const FrameRecord& frame : score.frames) nees.push_back(nees_of(frame, score.truth.has_value()));
-  score.consistency = check_consistency(nees, score.truth || result.flight.nav_is_truth);
+  score.consistency = check_consistency(score.frames, score.truth.has_value(), result.flight.nav_is_truth);
   score.reprojection_px = statistics(reprojection_px);
   score.detections = count_detections(score.frames);
   score.costs = measure_stage_costs(result.estimates);

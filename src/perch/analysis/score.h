@@ -38,6 +38,9 @@ struct Consistency {
   // Against the flight's exact truth where it holds one. Else against navigation, whose own noise then counts
   // as vision's: a mean NEES far above 6 says no more than that navigation is the noisier.
   bool by_truth = false;
+  // RMS of the error of the target's position as the camera sees it, over range; of all frames with a
+  // reference.
+  double seen_over_range_rms = std::numeric_limits<double>::quiet_NaN();
   size_t count = 0;
   double mean_nees = std::numeric_limits<double>::quiet_NaN();
   double lower = std::numeric_limits<double>::quiet_NaN(), upper = std::numeric_limits<double>::quiet_NaN();

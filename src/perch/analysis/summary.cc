@@ -75,6 +75,7 @@ Json bins_json(const std::vector<DistanceBin>& bins) {
 
 Json consistency_json(const Consistency& c) {
   return {{"reference", c.by_truth ? "truth" : "navigation"},
+          {"target_in_camera_over_range_rms", number(c.seen_over_range_rms)},
           {"frames", c.count},
           {"mean_nees", number(c.mean_nees)},
           {"expected_nees", 6},
