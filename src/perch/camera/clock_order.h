@@ -17,6 +17,7 @@ template <typename Row>
 std::vector<Row> in_time_order(std::vector<Row> rows, const std::vector<std::string>& places,
                                std::vector<std::string>& problems) {
   std::vector<int64_t> times;
+  times.reserve(rows.size());
   for (const Row& row : rows) times.push_back(row.timestamp_ns);
   const std::vector<bool> keep = keep_increasing(times);
   std::vector<Row> kept;

@@ -49,7 +49,8 @@ double room(const TargetEdges& target, const TargetEdge& edge, double side) {
     const Eigen::Vector2d a = other.from - edge.from, b = other.to - edge.from;
     const double distance = across.dot(a);
     if (distance < 1e-9 || std::abs(across.dot(b) - distance) > 1e-9) continue;  // behind, or not parallel
-    const auto [low, high] = std::minmax(along.dot(a), along.dot(b));
+    const double start = along.dot(a), end = along.dot(b);
+    const auto [low, high] = std::minmax(start, end);  // of references: they must not be to temporaries
     // A fifth of the edge more: what ends beside its end is near it too.
     if (low < 1.2 * length && high > -0.2 * length) nearest = std::min(nearest, distance);
   }
