@@ -30,9 +30,16 @@ ImageFrame frame_of(const Eigen::Matrix3d& H, const Eigen::Vector2d& centre, dou
 }
 
 Confirmation::Confirmation(const LandingTarget& target, const TargetEdges& edges, const CameraModel& camera)
-    : target_(edges), camera_(camera), size_(target.size), tallies_(edges.edges.size()) {}
+    : target_(edges),
+      camera_(camera),
+      grey_order_(edges, camera),
+      size_(target.size),
+      tallies_(edges.edges.size()) {}
 
-bool Confirmation::is_met(const Requirement& requirement) {
+bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const Requirement& requirement) {
+  // Edges too short or too near each other to be told apart are judged by the grey beside them.
+  in_order_.assign(tallies_.size(), {});
+  grey_order_.part_in_order(grey, H, requirement.contrast, in_order_);
   int squares = 0, border_edges = 0, holes = 0, holes_asked = 0, asked = 0, found = 0;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
     const ShapeKind kind = target_.shapes[i].kind;
@@ -44,9 +51,10 @@ bool Confirmation::is_met(const Requirement& requirement) {
         found += tally.found;
         asked += tally.asked;
       }
-      if (tally.asked < 2) continue;
+      const EdgeTally& judged = tally.asked < 2 ? in_order_[k] : tally;
+      if (judged.asked == 0) continue;
       ++known;
-      if (5 * tally.found >= 3 * tally.asked) ++seen;
+      if (5 * judged.found >= 3 * judged.asked) ++seen;
     }
     seen_[i] = seen >= 3 || (known == 2 && seen == 2);
     if (kind == ShapeKind::kSquare) {
@@ -98,7 +106,8 @@ std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const E
   if (inside < 3 || around < 3) return std::nullopt;
   const std::span<const double> seen(ring.data(), static_cast<size_t>(around));
   levels.around = std::accumulate(seen.begin(), seen.end(), 0.0) / around;
-  const double middle = 0.5 * (levels.inside + *std::ranges::min_element(seen));
+  // Nearer to white than to black: glare lifts the black on one side.
+  const double middle = 0.7 * levels.inside + 0.3 * *std::ranges::min_element(seen);
   levels.pale_around =
       static_cast<double>(std::ranges::count_if(seen, [&](double v) { return v > middle; })) / around;
   return levels;
@@ -183,7 +192,8 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
     widths_.push_back(steps_[i].width);
   }
   const Eigen::Matrix3d& H = result.image_from_plane;
-  if (!is_met(requirement) || lacks_squares(grey, H) || !squares_stand_free(grey, H)) return std::nullopt;
+  if (!is_met(grey, H, requirement) || lacks_squares(grey, H) || !squares_stand_free(grey, H))
+    return std::nullopt;
   for (const EdgeTally& tally : tallies_) {
     result.found += tally.found;
     result.asked += tally.asked;

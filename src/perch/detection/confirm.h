@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "perch/detection/edge_search.h"
+#include "perch/detection/grey_order.h"
 
 namespace perch {
 
@@ -48,7 +49,7 @@ class Confirmation {
                                    double radius, const Requirement& requirement);
 
  private:
-  bool is_met(const Requirement& requirement);
+  bool is_met(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, const Requirement& requirement);
   std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                         const TargetShape& square) const;
   bool lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
@@ -56,11 +57,12 @@ class Confirmation {
 
   TargetEdges target_;
   CameraModel camera_;
+  GreyOrder grey_order_;
   double size_;
   std::vector<EdgePiece> pieces_;
   std::vector<EdgeOffset> offsets_;
   std::vector<FoundStep> steps_;
-  std::vector<EdgeTally> tallies_;
+  std::vector<EdgeTally> tallies_, in_order_;
   std::vector<double> widths_;
   std::bitset<kMostShapes> seen_;  // as in Confirmed
 };
