@@ -38,8 +38,11 @@ Confirmation::Confirmation(const LandingTarget& target, const TargetEdges& edges
 
 bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const Requirement& requirement) {
   // Edges too short or too near each other to be told apart are judged by the grey beside them.
+  const auto is_unsure = [](const EdgeTally& tally) { return tally.asked < 2; };
   in_order_.assign(tallies_.size(), {});
-  grey_order_.part_in_order(grey, H, requirement.contrast, in_order_);
+  if (std::ranges::any_of(tallies_, is_unsure)) {
+    grey_order_.judge_edges(grey, H, requirement.contrast, in_order_);
+  }
   int squares = 0, border_edges = 0, holes = 0, holes_asked = 0, asked = 0, found = 0;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
     const ShapeKind kind = target_.shapes[i].kind;
@@ -51,7 +54,7 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
         found += tally.found;
         asked += tally.asked;
       }
-      const EdgeTally& judged = tally.asked < 2 ? in_order_[k] : tally;
+      const EdgeTally& judged = is_unsure(tally) ? in_order_[k] : tally;
       if (judged.asked == 0) continue;
       ++known;
       if (5 * judged.found >= 3 * judged.asked) ++seen;
@@ -113,42 +116,34 @@ std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const E
   return levels;
 }
 
-// Whether most of the squares that were seen lie in black by themselves. Those of a checkerboard touch
-// others.
-bool Confirmation::squares_stand_free(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
-  int free = 0, touched = 0;
-  for (size_t i = 0; i < target_.shapes.size(); ++i) {
-    if (target_.shapes[i].kind != ShapeKind::kSquare || !seen_[i]) continue;
-    const auto levels = levels_of(grey, H, target_.shapes[i]);
-    if (!levels) continue;
-    ++(levels->pale_around > 0.3 ? touched : free);
-  }
-  return touched <= free;
-}
-
-// Whether places of squares that were not seen are as black as the interior is in the brightest light that
-// falls on it: what covers a square is rarely that. One such is forgiven if all others are seen.
-bool Confirmation::lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
+// Whether most of the squares that were seen lie in black by themselves: those of a checkerboard touch
+// others. And whether places of squares that were not seen are other than as black as the interior is in the
+// brightest light that falls on it: what covers a square is rarely that. One such is forgiven if all others
+// are seen.
+bool Confirmation::is_layout(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
   double black = 0, contrast = 255;
+  int free = 0, touched = 0, seen = 0, unseen = 0, lacking = 0;
+  const auto is_square = [&](size_t i) { return target_.shapes[i].kind == ShapeKind::kSquare; };
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
-    if (target_.shapes[i].kind != ShapeKind::kSquare || !seen_[i]) continue;
+    if (!is_square(i) || !seen_[i]) continue;
+    ++seen;
     const auto levels = levels_of(grey, H, target_.shapes[i]);
     if (!levels) continue;
     black = std::max(black, levels->around);
     contrast = std::min(contrast, levels->inside - levels->around);
+    ++(levels->pale_around > 0.3 ? touched : free);
   }
-  int seen = 0, unseen = 0, lacking = 0;
+  if (touched > free) return false;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
+    if (!is_square(i) || seen_[i]) continue;
     int asked = 0;
     for (size_t k = 4 * i; k < 4 * i + 4; ++k) asked += tallies_[k].asked;
-    if (target_.shapes[i].kind != ShapeKind::kSquare || asked == 0) continue;
-    seen += seen_[i];
-    if (seen_[i]) continue;
+    if (asked == 0) continue;
     ++unseen;
     const auto levels = levels_of(grey, H, target_.shapes[i]);
     if (levels && levels->inside < black + 0.3 * std::max(contrast, 0.0)) ++lacking;
   }
-  return lacking > (unseen == 1 && seen >= 5 ? 1 : 0);
+  return lacking <= (unseen == 1 && seen >= 5 ? 1 : 0);
 }
 
 std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
@@ -192,8 +187,7 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
     widths_.push_back(steps_[i].width);
   }
   const Eigen::Matrix3d& H = result.image_from_plane;
-  if (!is_met(grey, H, requirement) || lacks_squares(grey, H) || !squares_stand_free(grey, H))
-    return std::nullopt;
+  if (!is_met(grey, H, requirement) || !is_layout(grey, H)) return std::nullopt;
   for (const EdgeTally& tally : tallies_) {
     result.found += tally.found;
     result.asked += tally.asked;

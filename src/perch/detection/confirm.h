@@ -52,8 +52,7 @@ class Confirmation {
   bool is_met(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, const Requirement& requirement);
   std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                         const TargetShape& square) const;
-  bool lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
-  bool squares_stand_free(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
+  bool is_layout(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
 
   TargetEdges target_;
   CameraModel camera_;

@@ -1,7 +1,6 @@
 #include "perch/detection/grey_order.h"
 
-#include <cmath>
-#include <optional>
+#include <array>
 
 namespace perch {
 namespace {
@@ -25,34 +24,45 @@ GreyOrder::GreyOrder(const TargetEdges& target, const CameraModel& camera) : cam
   }
 }
 
-double GreyOrder::part_in_order(const cv::Mat& grey, const Eigen::Matrix3d& H, double contrast) const {
-  return part_in_order(grey, H, contrast, {});
-}
-
-double GreyOrder::part_in_order(const cv::Mat& grey, const Eigen::Matrix3d& H, double contrast,
-                                std::span<EdgeTally> tallies) const {
-  const auto value = [&](const Eigen::Vector2d& q) -> std::optional<int> {
-    const Eigen::Vector3d p = H * q.homogeneous();
-    const auto pixel = p.z() > 0 ? camera_.pixel_from_camera(p) : std::nullopt;
+std::optional<bool> GreyOrder::look(const cv::Mat& grey, const Eigen::Matrix3d& H, const Pair& pair,
+                                    double contrast) const {
+  const std::array<Eigen::Vector3d, 2> points{H * pair.white.homogeneous(), H * pair.black.homogeneous()};
+  if (!(points[0].z() > 0 && points[1].z() > 0)) return std::nullopt;
+  std::array<int, 2> values{};
+  for (size_t i = 0; i < 2; ++i) {
+    const auto pixel = camera_.pixel_from_camera(points[i]);
     if (!pixel ||
         !(pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < grey.cols - 1 && pixel->y() < grey.rows - 1)) {
       return std::nullopt;
     }
-    return grey.at<uint8_t>(static_cast<int>(pixel->y() + 0.5), static_cast<int>(pixel->x() + 0.5));
-  };
+    values[i] = grey.at<uint8_t>(static_cast<int>(pixel->y() + 0.5), static_cast<int>(pixel->x() + 0.5));
+  }
+  return values[0] - values[1] >= contrast;
+}
+
+double GreyOrder::part_in_order(const cv::Mat& grey, const Eigen::Matrix3d& H, double contrast,
+                                double least) const {
   int asked = 0, in_order = 0;
+  // How many may be out of order if all are asked.
+  const double allowed = (1 - least) * static_cast<double>(pairs_.size());
   for (const Pair& pair : pairs_) {
-    const auto white = value(pair.white);
-    const auto black = white ? value(pair.black) : std::nullopt;
-    if (!black) continue;
-    const bool is_in_order = *white - *black >= contrast;
+    const auto is_in_order = look(grey, H, pair, contrast);
+    if (!is_in_order) continue;
     ++asked;
-    in_order += is_in_order;
-    if (tallies.empty()) continue;
-    ++tallies[pair.edge].asked;
-    tallies[pair.edge].found += is_in_order;
+    in_order += *is_in_order;
+    if (asked - in_order > allowed) return 0;
   }
   return asked < kLeastPairs ? 0 : static_cast<double>(in_order) / asked;
+}
+
+void GreyOrder::judge_edges(const cv::Mat& grey, const Eigen::Matrix3d& H, double contrast,
+                            std::span<EdgeTally> tallies) const {
+  for (const Pair& pair : pairs_) {
+    const auto is_in_order = look(grey, H, pair, contrast);
+    if (!is_in_order) continue;
+    ++tallies[pair.edge].asked;
+    tallies[pair.edge].found += *is_in_order;
+  }
 }
 
 }  // namespace perch

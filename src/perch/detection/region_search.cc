@@ -1,6 +1,7 @@
 #include "perch/detection/region_search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ranges>
 
@@ -95,11 +96,11 @@ bool RegionSearch::is_quad(const Picture& picture, WhiteQuad& quad) {
 bool RegionSearch::try_hypotheses(const Picture& picture, std::vector<Confirmed>& found) {
   const cv::Mat& grey = picture.grey;
   std::optional<Confirmed> best;
-  const auto order_of = [&](const Eigen::Matrix3d& H) {
-    return grey_order_.part_in_order(grey, H, 0.5 * requirement_.contrast);
+  const auto order_of = [&](const Eigen::Matrix3d& H, double least) {
+    return grey_order_.part_in_order(grey, H, 0.5 * requirement_.contrast, least);
   };
   const auto consider = [&](const Eigen::Matrix3d& H) {
-    if (tries_ == 0 || order_of(H) < kLeastInOrder) return;
+    if (tries_ == 0 || order_of(H, kLeastInOrder) < kLeastInOrder) return;
     --tries_;
     const auto confirmed = confirmation_.confirm(grey, H, kRegionRadius, requirement_);
     if (confirmed && (!best || confirmed->score() > best->score())) best = confirmed;
@@ -111,22 +112,27 @@ bool RegionSearch::try_hypotheses(const Picture& picture, std::vector<Confirmed>
     if (edges_.shapes.size() <= 8 && is_explained()) break;
   }
   if (!best) return false;
-  const Eigen::Matrix3d H = best->image_from_plane;
-  const auto turned = [&](int quarters) -> Eigen::Matrix3d {
+  const auto turned = [](const Eigen::Matrix3d& H, int quarters) -> Eigen::Matrix3d {
     return H * Eigen::AngleAxisd(quarters * M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   };
-  const double order = order_of(H);
+  const auto rivals = [&](const Eigen::Matrix3d& H, double order) {
+    std::array<bool, 4> as_good{};
+    for (int k = 1; k < 4; ++k) as_good[static_cast<size_t>(k)] = order_of(turned(H, k), order) >= order;
+    return as_good;
+  };
+  const Eigen::Matrix3d first = best->image_from_plane;
+  double order = order_of(first, 0);
+  auto as_good = rivals(first, order);
+  const bool is_sure = is_explained();
   for (int k = 1; k < 4; ++k) {
-    if (order_of(turned(k)) >= order || !is_explained()) consider(turned(k));
+    if (!is_sure || as_good[static_cast<size_t>(k)]) consider(turned(first, k));
   }
-  const Eigen::Matrix3d chosen = best->image_from_plane;
-  const double own = order_of(chosen);
-  if (own + static_cast<double>(best->found) / best->asked < kLeastSure) return false;
-  for (int k = 1; k < 4; ++k) {
-    const Eigen::Matrix3d other =
-        chosen * Eigen::AngleAxisd(k * M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-    if (order_of(other) >= own) return false;
+  if (best->image_from_plane != first) {
+    order = order_of(best->image_from_plane, 0);
+    as_good = rivals(best->image_from_plane, order);
   }
+  if (std::ranges::find(as_good, true) != as_good.end()) return false;
+  if (order + static_cast<double>(best->found) / best->asked < kLeastSure) return false;
   const TargetArea area(target_, edges_, camera_, *best);
   for (WhiteQuad& quad : quads_) {
     if (area.may_hold(quad.seen.centre) && is_quad(picture, quad) && area.is_stranger(quad)) return false;
