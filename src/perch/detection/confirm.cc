@@ -18,6 +18,13 @@ constexpr int kLastLines = 6;
 // Nor does a target of which so little can be seen say what it is.
 constexpr int kLeastLines = 12;
 
+// Of values, at least one, which it puts into another order.
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace
 
 ImageFrame frame_of(const Eigen::Matrix3d& H, const Eigen::Vector2d& centre, double size) {
@@ -178,11 +185,14 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
   }
   // What is found must be where it should be, not only near.
   widths_.clear();
+  contrasts_.clear();
+  for (const FoundStep& step : steps_) contrasts_.push_back(step.contrast);
+  result.contrast = median(contrasts_);
   for (EdgeTally& tally : tallies_) tally.found = 0;
   for (size_t i = 0; i < offsets_.size(); ++i) {
     const EdgeOffset& o = offsets_[i];
     const double left = o.offset - o.jacobian.dot(fit.step) - o.white * fit.growth;
-    if (std::abs(left) > 0.8) continue;
+    if (std::abs(left) > 0.8 || steps_[i].contrast < kLeastOfContrast * result.contrast) continue;
     ++tallies_[static_cast<size_t>(steps_[i].edge)].found;
     widths_.push_back(steps_[i].width);
   }
@@ -192,10 +202,8 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
     result.found += tally.found;
     result.asked += tally.asked;
   }
-  const auto middle = widths_.begin() + static_cast<std::ptrdiff_t>(widths_.size() / 2);
-  std::nth_element(widths_.begin(), middle, widths_.end());
   result.seen = seen_;
-  result.blur = std::clamp(*middle, 0.5, 3.0);
+  result.blur = std::clamp(median(widths_), 0.5, 3.0);
   return result;
 }
 

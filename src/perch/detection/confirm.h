@@ -20,6 +20,7 @@ struct Confirmed {
   ImageFrame frame;
   int found = 0, asked = 0;       // lines
   double blur = 0.8;              // deviation across edges, px
+  double contrast = 0;            // median of the steps, grey levels
   std::bitset<kMostShapes> seen;  // by shape: enough of its edges are
   double score() const { return 2.0 * found - asked; }
 };
@@ -31,6 +32,9 @@ struct Requirement {
   double found = 0.5;    // of the lines across squares and the border's inner edge
   double contrast = 12;  // grey levels
 };
+
+// Of the median contrast: what is less is noise, not an edge in the shadow.
+inline constexpr double kLeastOfContrast = 0.18;
 
 // Grey levels in and around a square's place.
 struct SquareLevels {
@@ -62,7 +66,7 @@ class Confirmation {
   std::vector<EdgeOffset> offsets_;
   std::vector<FoundStep> steps_;
   std::vector<EdgeTally> tallies_, in_order_;
-  std::vector<double> widths_;
+  std::vector<double> widths_, contrasts_;
   std::bitset<kMostShapes> seen_;  // as in Confirmed
 };
 

@@ -44,6 +44,7 @@ class RegionSearch {
   bool is_known(const Eigen::Vector2d& pixel) const;
   void search_group(const Picture& picture, const Group& group, Stopwatch& stopwatch,
                     std::vector<Confirmed>& found);
+  bool is_sure_enough(const Confirmed& found, double in_order) const;
   bool try_hypotheses(const Picture& picture, std::vector<Confirmed>& found);
 
   LandingTarget target_;

@@ -98,4 +98,17 @@ bool TargetArea::is_stranger(const WhiteQuad& quad) const {
   return !(hidden == 1 ? std::ranges::any_of(shapes, touches) : std::ranges::count_if(shapes, hides) >= 2);
 }
 
+std::optional<size_t> TargetArea::piece_of(const WhiteQuad& quad) const {
+  if (!quad.four_sided || !box_.contains(quad.seen.centre)) return std::nullopt;
+  const auto centre = on_plane(quad.seen.centre);
+  const auto corner = on_plane(quad.seen.corners[0]);
+  if (!centre || !corner) return std::nullopt;
+  for (size_t i = 0; i < edges_.shapes.size(); ++i) {
+    const TargetShape& shape = edges_.shapes[i];
+    if (!is_hidden(i) || (*centre - shape.centre).cwiseAbs().maxCoeff() > 0.5 * shape.side) continue;
+    if (M_SQRT2 * (*corner - *centre).norm() < 0.7 * shape.side) return i;
+  }
+  return std::nullopt;
+}
+
 }  // namespace perch

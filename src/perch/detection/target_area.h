@@ -25,6 +25,9 @@ class TargetArea {
   // ours do.
   bool is_stranger(const WhiteQuad& quad) const;
 
+  // The square that was not seen and in which a four-sided region lies, much smaller than it.
+  std::optional<size_t> piece_of(const WhiteQuad& quad) const;
+
  private:
   std::optional<Eigen::Vector2d> on_plane(const Eigen::Vector2d& pixel) const;
   bool is_hidden(size_t shape) const;
