@@ -120,13 +120,14 @@ TEST(EdgeFit, LightThatFallsOffShiftsNothing) {
   EXPECT_LT(errors.rms, 2 * bound(0.5, 120, 0.75, 24));
 }
 
-// In the mean; where all lines of a piece meet the pixels alike, to a hundredth of a pixel or two, which the next
-// look with the blur that was found does not leave.
+// In the mean; where all lines of a piece meet the pixels alike, to a hundredth of a pixel or two, which the
+// next look with the blur that was found does not leave.
 TEST(EdgeFit, ABlurThatIsExpectedWrongShiftsNothing) {
   for (const double expected : {0.6, 0.7, 0.75, 0.8, 0.95}) {
     const Errors errors = measure({.blur = 0.75, .noise = 0.5}, expected, 40);
     EXPECT_LT(std::abs(errors.mean), 0.001) << expected;
-    EXPECT_LT(errors.rms, std::abs(expected - 0.75) > 0.03 ? 0.02 : 2 * bound(0.5, 120, 0.75, 24)) << expected;
+    EXPECT_LT(errors.rms, std::abs(expected - 0.75) > 0.03 ? 0.02 : 2 * bound(0.5, 120, 0.75, 24))
+        << expected;
   }
 }
 

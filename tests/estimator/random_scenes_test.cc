@@ -21,16 +21,16 @@ struct Kind {
 
 const Kind kKinds[] = {
     {"Plain", {}, 1},
-    {"Small", {.smallest_px = 2.5, .largest_px = 4, .steepest = 0.7}, 0.2},
+    {"Small", {.smallest_px = 2.5, .largest_px = 4, .steepest = 0.7}, 0.97},
     {"Large", {.smallest_px = 40, .largest_px = 120, .steepest = 0.7, .cut = true}, 0.9},
-    {"Steep", {.smallest_px = 3, .largest_px = 30, .steepest = 75 * kRadFromDeg}, 0.9},
+    {"Steep", {.smallest_px = 3, .largest_px = 30, .steepest = 75 * kRadFromDeg}, 0.95},
     {"Covered", {.covered = true}, 0.9},
-    {"Cut", {.cut = true}, 0.9},
-    {"Light", {.shadow = true, .glare = true, .gradient = true}, 0.8},
-    {"Faded", {.gradient = true, .faded = true}, 0.9},
-    {"Poor", {.smallest_px = 5, .noisy = true, .blurred = true}, 0.7},
+    {"Cut", {.cut = true}, 0.97},
+    {"Light", {.shadow = true, .glare = true, .gradient = true}, 0.9},
+    {"Faded", {.gradient = true, .faded = true}, 0.97},
+    {"Poor", {.smallest_px = 5, .noisy = true, .blurred = true}, 0.95},
     {"Lens", {.lens = true}, 1},
-    {"Everything", {3, 80, 70 * kRadFromDeg, true, true, true, true, true, true, true, true, true}, 0.45},
+    {"Everything", {3, 80, 70 * kRadFromDeg, true, true, true, true, true, true, true, true, true}, 0.7},
 };
 
 class RandomScenes : public testing::TestWithParam<Kind> {};

@@ -18,6 +18,13 @@ constexpr int kLastLines = 6;
 // Nor does a target of which so little can be seen say what it is.
 constexpr int kLeastLines = 12;
 
+// Of values, at least one, which it puts into another order.
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace
 
 ImageFrame frame_of(const Eigen::Matrix3d& H, const Eigen::Vector2d& centre, double size) {
@@ -30,9 +37,19 @@ ImageFrame frame_of(const Eigen::Matrix3d& H, const Eigen::Vector2d& centre, dou
 }
 
 Confirmation::Confirmation(const LandingTarget& target, const TargetEdges& edges, const CameraModel& camera)
-    : target_(edges), camera_(camera), size_(target.size), tallies_(edges.edges.size()) {}
+    : target_(edges),
+      camera_(camera),
+      grey_order_(edges, camera),
+      size_(target.size),
+      tallies_(edges.edges.size()) {}
 
-bool Confirmation::is_met(const Requirement& requirement) {
+bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const Requirement& requirement) {
+  // Edges too short or too near each other to be told apart are judged by the grey beside them.
+  const auto is_unsure = [](const EdgeTally& tally) { return tally.asked < 2; };
+  in_order_.assign(tallies_.size(), {});
+  if (std::ranges::any_of(tallies_, is_unsure)) {
+    grey_order_.judge_edges(grey, H, requirement.contrast, in_order_);
+  }
   int squares = 0, border_edges = 0, holes = 0, holes_asked = 0, asked = 0, found = 0;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
     const ShapeKind kind = target_.shapes[i].kind;
@@ -44,9 +61,10 @@ bool Confirmation::is_met(const Requirement& requirement) {
         found += tally.found;
         asked += tally.asked;
       }
-      if (tally.asked < 2) continue;
+      const EdgeTally& judged = is_unsure(tally) ? in_order_[k] : tally;
+      if (judged.asked == 0) continue;
       ++known;
-      if (5 * tally.found >= 3 * tally.asked) ++seen;
+      if (5 * judged.found >= 3 * judged.asked) ++seen;
     }
     seen_[i] = seen >= 3 || (known == 2 && seen == 2);
     if (kind == ShapeKind::kSquare) {
@@ -98,48 +116,41 @@ std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const E
   if (inside < 3 || around < 3) return std::nullopt;
   const std::span<const double> seen(ring.data(), static_cast<size_t>(around));
   levels.around = std::accumulate(seen.begin(), seen.end(), 0.0) / around;
-  const double middle = 0.5 * (levels.inside + *std::ranges::min_element(seen));
+  // Nearer to white than to black: glare lifts the black on one side.
+  const double middle = 0.7 * levels.inside + 0.3 * *std::ranges::min_element(seen);
   levels.pale_around =
       static_cast<double>(std::ranges::count_if(seen, [&](double v) { return v > middle; })) / around;
   return levels;
 }
 
-// Whether most of the squares that were seen lie in black by themselves. Those of a checkerboard touch
-// others.
-bool Confirmation::squares_stand_free(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
-  int free = 0, touched = 0;
-  for (size_t i = 0; i < target_.shapes.size(); ++i) {
-    if (target_.shapes[i].kind != ShapeKind::kSquare || !seen_[i]) continue;
-    const auto levels = levels_of(grey, H, target_.shapes[i]);
-    if (!levels) continue;
-    ++(levels->pale_around > 0.3 ? touched : free);
-  }
-  return touched <= free;
-}
-
-// Whether places of squares that were not seen are as black as the interior is in the brightest light that
-// falls on it: what covers a square is rarely that. One such is forgiven if all others are seen.
-bool Confirmation::lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
+// Whether most of the squares that were seen lie in black by themselves: those of a checkerboard touch
+// others. And whether places of squares that were not seen are other than as black as the interior is in the
+// brightest light that falls on it: what covers a square is rarely that. One such is forgiven if all others
+// are seen.
+bool Confirmation::is_layout(const cv::Mat& grey, const Eigen::Matrix3d& H) const {
   double black = 0, contrast = 255;
+  int free = 0, touched = 0, seen = 0, unseen = 0, lacking = 0;
+  const auto is_square = [&](size_t i) { return target_.shapes[i].kind == ShapeKind::kSquare; };
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
-    if (target_.shapes[i].kind != ShapeKind::kSquare || !seen_[i]) continue;
+    if (!is_square(i) || !seen_[i]) continue;
+    ++seen;
     const auto levels = levels_of(grey, H, target_.shapes[i]);
     if (!levels) continue;
     black = std::max(black, levels->around);
     contrast = std::min(contrast, levels->inside - levels->around);
+    ++(levels->pale_around > 0.3 ? touched : free);
   }
-  int seen = 0, unseen = 0, lacking = 0;
+  if (touched > free) return false;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
+    if (!is_square(i) || seen_[i]) continue;
     int asked = 0;
     for (size_t k = 4 * i; k < 4 * i + 4; ++k) asked += tallies_[k].asked;
-    if (target_.shapes[i].kind != ShapeKind::kSquare || asked == 0) continue;
-    seen += seen_[i];
-    if (seen_[i]) continue;
+    if (asked == 0) continue;
     ++unseen;
     const auto levels = levels_of(grey, H, target_.shapes[i]);
     if (levels && levels->inside < black + 0.3 * std::max(contrast, 0.0)) ++lacking;
   }
-  return lacking > (unseen == 1 && seen >= 5 ? 1 : 0);
+  return lacking <= (unseen == 1 && seen >= 5 ? 1 : 0);
 }
 
 std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
@@ -174,24 +185,25 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
   }
   // What is found must be where it should be, not only near.
   widths_.clear();
+  contrasts_.clear();
+  for (const FoundStep& step : steps_) contrasts_.push_back(step.contrast);
+  result.contrast = median(contrasts_);
   for (EdgeTally& tally : tallies_) tally.found = 0;
   for (size_t i = 0; i < offsets_.size(); ++i) {
     const EdgeOffset& o = offsets_[i];
     const double left = o.offset - o.jacobian.dot(fit.step) - o.white * fit.growth;
-    if (std::abs(left) > 0.8) continue;
+    if (std::abs(left) > 0.8 || steps_[i].contrast < kLeastOfContrast * result.contrast) continue;
     ++tallies_[static_cast<size_t>(steps_[i].edge)].found;
     widths_.push_back(steps_[i].width);
   }
   const Eigen::Matrix3d& H = result.image_from_plane;
-  if (!is_met(requirement) || lacks_squares(grey, H) || !squares_stand_free(grey, H)) return std::nullopt;
+  if (!is_met(grey, H, requirement) || !is_layout(grey, H)) return std::nullopt;
   for (const EdgeTally& tally : tallies_) {
     result.found += tally.found;
     result.asked += tally.asked;
   }
-  const auto middle = widths_.begin() + static_cast<std::ptrdiff_t>(widths_.size() / 2);
-  std::nth_element(widths_.begin(), middle, widths_.end());
   result.seen = seen_;
-  result.blur = std::clamp(*middle, 0.5, 3.0);
+  result.blur = std::clamp(median(widths_), 0.5, 3.0);
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "perch/detection/edge_search.h"
+#include "perch/detection/grey_order.h"
 
 namespace perch {
 
@@ -19,6 +20,7 @@ struct Confirmed {
   ImageFrame frame;
   int found = 0, asked = 0;       // lines
   double blur = 0.8;              // deviation across edges, px
+  double contrast = 0;            // median of the steps, grey levels
   std::bitset<kMostShapes> seen;  // by shape: enough of its edges are
   double score() const { return 2.0 * found - asked; }
 };
@@ -30,6 +32,9 @@ struct Requirement {
   double found = 0.5;    // of the lines across squares and the border's inner edge
   double contrast = 12;  // grey levels
 };
+
+// Of the median contrast: what is less is noise, not an edge in the shadow.
+inline constexpr double kLeastOfContrast = 0.18;
 
 // Grey levels in and around a square's place.
 struct SquareLevels {
@@ -48,20 +53,20 @@ class Confirmation {
                                    double radius, const Requirement& requirement);
 
  private:
-  bool is_met(const Requirement& requirement);
+  bool is_met(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, const Requirement& requirement);
   std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                         const TargetShape& square) const;
-  bool lacks_squares(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
-  bool squares_stand_free(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
+  bool is_layout(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
 
   TargetEdges target_;
   CameraModel camera_;
+  GreyOrder grey_order_;
   double size_;
   std::vector<EdgePiece> pieces_;
   std::vector<EdgeOffset> offsets_;
   std::vector<FoundStep> steps_;
-  std::vector<EdgeTally> tallies_;
-  std::vector<double> widths_;
+  std::vector<EdgeTally> tallies_, in_order_;
+  std::vector<double> widths_, contrasts_;
   std::bitset<kMostShapes> seen_;  // as in Confirmed
 };
 

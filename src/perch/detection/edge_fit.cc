@@ -128,6 +128,16 @@ bool fit_lines(const cv::Mat& grey, const CrossingLines& lines, int step, const 
   return solve(sums, piece);
 }
 
+// A level, `half` a contrast above the middle of the step, as far as the piece's own does not speak against
+// it: one in the shadow that others are not has its own.
+LevelSurface::Level believed(const EdgeFit::Piece& piece, const LevelSurface::Level& level, double half) {
+  constexpr double kDeviations = 4;
+  const Eigen::Vector3d u(1, half, 0);
+  const double variance = level.variance + piece.variance * u.dot(piece.A.inverse() * u);
+  const double off = u.dot(piece.own) - level.value;
+  return off * off > kDeviations * kDeviations * variance ? LevelSurface::Level{} : level;
+}
+
 struct Step {
   double offset = 0, sigma = 0;  // along the line, px
   double contrast = 0;
@@ -261,10 +271,11 @@ void EdgeFit::measure(const cv::Mat& grey, std::span<const EdgePiece> pieces,
   widen_on_ground(on_ground);
   for (const Piece& p : fitted_) {
     const EdgePiece& piece = pieces[static_cast<size_t>(p.index)];
-    const LevelSurface::Level white = white_.at(piece.middle);
+    const LevelSurface::Level white = believed(p, white_.at(piece.middle), 0.5 * p.sign());
     // Of the ground nothing is known.
     const bool of_ground = on_ground[static_cast<size_t>(p.index)] != 0;
-    const LevelSurface::Level black = of_ground ? LevelSurface::Level{} : black_.at(piece.middle);
+    const LevelSurface::Level black =
+        of_ground ? LevelSurface::Level{} : believed(p, black_.at(piece.middle), -0.5 * p.sign());
     const Step step = solve(p, white, black);
     if (!(std::abs(step.offset) < 0.5) || !std::isfinite(step.sigma)) continue;
     EdgeOffset offset;

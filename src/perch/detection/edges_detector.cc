@@ -10,10 +10,10 @@
 #include "perch/detection/confirm.h"
 #include "perch/detection/edge_fit.h"
 #include "perch/detection/grey_range.h"
-#include "perch/detection/hypotheses.h"
 #include "perch/detection/local_contrast.h"
+#include "perch/detection/local_mean.h"
 #include "perch/detection/picture_fit.h"
-#include "perch/detection/quads.h"
+#include "perch/detection/region_search.h"
 #include "perch/detection/stopwatch.h"
 
 namespace perch {
@@ -22,20 +22,43 @@ namespace {
 // Regions of fewer sampled pixels are noise.
 constexpr int kLeastPixels = 3;
 
-// Of a black region's white ones; three squares may be covered.
+// Three squares of six may be covered.
 constexpr int kLeastSquares = 3;
-constexpr int kLeastRegions = 2;  // in which to look for them: a shadow's edge may break the others
 
-// A hypothesis from regions is a few pixels off at most, one from a prediction up to as far as its
-// sigma says.
-constexpr double kRegionRadius = 4;       // px
+// How far the window of a local mean reaches: a small square of 2.5 px and one of 15 have black on both sides
+// within it, and larger ones are seen in the picture at half the size.
+constexpr int kReach = 7;  // px
+
+// How often the picture is halved, and the smallest that still is.
+constexpr size_t kMostHalves = 3;
+constexpr int kLeastSide = 100;  // px
+
+// A prediction is off by as much as its sigma says, at most so far.
 constexpr double kPredictionRadius = 10;  // px, beyond which the whole picture is the better place to look
 
 // A piece of an edge for the fine fit: an arc over this length is a parabola to a hundredth of a pixel.
 constexpr double kPiece = 32;  // px
 
+// No lens is sharper, its pixels included; what seems to be is drawn without a lens.
+constexpr double kSharpest = 0.45;  // px
+
 // Squares smaller than this are measured by their picture.
 constexpr double kSmallSquare = 7;  // px
+
+// The picture at half the size of the one before, where noise and blur are half as large.
+struct Level {
+  cv::Mat grey;
+  CameraModel camera;
+  RegionSearch regions;
+};
+
+// The camera that takes the picture at half the size: pixel x covers 2 x and 2 x + 1.
+CameraModel halved(const CameraModel& camera) {
+  std::vector<double> intrinsics = camera.intrinsics();
+  for (size_t i = 0; i < 2; ++i) intrinsics[i] /= 2;
+  for (size_t i = 2; i < 4; ++i) intrinsics[i] = (intrinsics[i] - 0.5) / 2;
+  return {camera.lens(), intrinsics, camera.width() / 2, camera.height() / 2};
+}
 
 }  // namespace
 
@@ -55,7 +78,7 @@ struct EdgesDetector::Work {
   TargetEdges edges;
   CameraModel camera;
   EdgesOptions options;
-  Hypotheses hypotheses;
+  RegionSearch regions;
   Confirmation confirmation;
   EdgeFit edge_fit;
   PictureFit picture_fit;
@@ -63,9 +86,8 @@ struct EdgesDetector::Work {
 
   Segmentation segmentation;
   LocalContrast contrast;
-  std::vector<WhiteQuad> quads;
-  std::vector<size_t> order, members;
-  std::vector<Hypothesis> proposed;
+  LocalMean local_mean;
+  std::vector<Level> halves;
   std::vector<Confirmed> confirmed;
   std::vector<EdgePiece> pieces;
   std::vector<EdgeOffset> offsets;
@@ -77,14 +99,20 @@ struct EdgesDetector::Work {
         edges(target_edges(std::get<SquaresLayout>(t.layout), t.size)),
         camera(c),
         options(o),
-        hypotheses(t, edges),
+        regions(t, edges, c, o.min_found, o.min_contrast),
         confirmation(t, edges, c),
-        picture_fit(edges, c) {}
+        picture_fit(edges, c) {
+    halves.reserve(kMostHalves);
+    const CameraModel* last = &camera;
+    while (halves.size() < kMostHalves && std::min(last->width(), last->height()) >= kLeastSide) {
+      const CameraModel half = halved(*last);
+      halves.push_back({{}, half, {t, edges, half, o.min_found, o.min_contrast}});
+      last = &halves.back().camera;
+    }
+  }
 
-  bool holds(const Confirmed& found, const Eigen::Vector2d& pixel) const;
-  bool has_stranger(const Confirmed& found) const;
-  bool try_hypotheses(const cv::Mat& grey);
-  void search_regions(const cv::Mat& grey, int row_step, Stopwatch& stopwatch);
+  void search(const cv::Mat& grey, Stopwatch& stopwatch);
+  void search_means(const cv::Mat& grey, RegionSearch& search_regions, Stopwatch& stopwatch);
   std::optional<Confirmed> follow(const cv::Mat& grey, const Prediction& prediction);
   bool is_outline(const EdgePiece& piece) const;
   void share_growth();
@@ -108,144 +136,6 @@ EdgesDetector::EdgesDetector(const LandingTarget& target, const CameraModel& cam
 
 EdgesDetector::~EdgesDetector() = default;
 
-// Whether a pixel lies on a target that was found.
-bool EdgesDetector::Work::holds(const Confirmed& found, const Eigen::Vector2d& pixel) const {
-  const auto ray = camera.ray_from_pixel(pixel);
-  if (!ray) return false;
-  const Eigen::Vector3d q = found.image_from_plane.inverse() * *ray;
-  return std::abs(q.z()) > 0 && q.hnormalized().cwiseAbs().maxCoeff() < 0.5 * target.size;
-}
-
-// Whether in the black interior there is a white four-sided region that is no square of the target, nor a
-// piece of one, nor what covers one: then it is another panel, of which some squares happen to lie where ours
-// do.
-bool EdgesDetector::Work::has_stranger(const Confirmed& found) const {
-  const Eigen::Matrix3d plane_from_image = found.image_from_plane.inverse();
-  const auto on_plane = [&](const Eigen::Vector2d& pixel) -> std::optional<Eigen::Vector2d> {
-    const auto ray = camera.ray_from_pixel(pixel);
-    if (!ray) return std::nullopt;
-    return (plane_from_image * *ray).hnormalized();
-  };
-  double interior = 0, smallest = target.size;
-  for (const TargetShape& shape : edges.shapes) {
-    if (shape.inner) continue;
-    if (shape.kind == ShapeKind::kInterior) interior = shape.side;
-    if (shape.kind == ShapeKind::kSquare) smallest = std::min(smallest, shape.side);
-  }
-  const auto shapes = std::views::iota(size_t{0}, edges.shapes.size());
-  const auto is_hidden = [&](size_t i) {
-    return edges.shapes[i].kind == ShapeKind::kSquare && !edges.shapes[i].inner && !found.seen[i];
-  };
-  const auto hidden = std::ranges::count_if(shapes, is_hidden);
-  for (const WhiteQuad& quad : quads) {
-    if (!quad.four_sided) continue;
-    std::array<Eigen::Vector2d, 4> corners;
-    bool known = true;
-    for (size_t k = 0; k < 4; ++k) {
-      const auto corner = on_plane(quad.seen.corners[k]);
-      known = known && corner;
-      if (corner) corners[k] = *corner;
-    }
-    const auto inside = [&](const Eigen::Vector2d& c) { return c.cwiseAbs().maxCoeff() < 0.5 * interior; };
-    if (!known || !std::ranges::all_of(corners, inside)) continue;
-    const double side =
-        0.5 * ((corners[0] - corners[2]).norm() + (corners[1] - corners[3]).norm()) / std::sqrt(2.0);
-    if (side < 0.6 * smallest) continue;
-    const double slack = 0.3 * smallest;
-    const auto on_shape = [&](size_t i) {
-      const TargetShape& shape = edges.shapes[i];
-      if (shape.kind != ShapeKind::kSquare && !shape.inner) return false;
-      return std::ranges::all_of(corners, [&](const Eigen::Vector2d& c) {
-        return (c - shape.centre).cwiseAbs().maxCoeff() < 0.5 * shape.side + slack;
-      });
-    };
-    if (std::ranges::any_of(shapes, on_shape)) continue;
-    // What covers a square: with all others in sight, or two at once. Another panel's square does neither.
-    const Eigen::Vector2d centre = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
-    const auto touches = [&](size_t i) {
-      return is_hidden(i) &&
-             (centre - edges.shapes[i].centre).cwiseAbs().maxCoeff() < 0.5 * (edges.shapes[i].side + side);
-    };
-    const auto hides = [&](size_t i) {
-      return is_hidden(i) && (centre - edges.shapes[i].centre).norm() < 0.5 * side;
-    };
-    if (hidden == 1 ? std::ranges::any_of(shapes, touches) : std::ranges::count_if(shapes, hides) >= 2)
-      continue;
-    return true;
-  }
-  return false;
-}
-
-// The best of the proposed that the picture confirms. The border looks the same after a quarter turn, and so
-// do some of the squares where others are hidden: all four turns are tried.
-bool EdgesDetector::Work::try_hypotheses(const cv::Mat& grey) {
-  const Requirement requirement{kLeastSquares, 2, options.min_found, options.min_contrast};
-  std::optional<Confirmed> best;
-  const auto consider = [&](const Eigen::Matrix3d& H) {
-    const auto found = confirmation.confirm(grey, H, kRegionRadius, requirement);
-    if (found && (!best || found->score() > best->score())) best = found;
-  };
-  for (const Hypothesis& h : proposed) {
-    consider(h.image_from_plane);
-    // One that explains nearly everything needs no rival; of a nested target both scales are tried.
-    if (best && edges.shapes.size() <= 8 && best->found > 0.85 * best->asked) break;
-  }
-  if (!best) return false;
-  if (best->found < 0.85 * best->asked) {
-    const Eigen::Matrix3d H = best->image_from_plane;
-    Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();
-    for (int k = 1; k < 4; ++k) {
-      turned = turned * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-      consider(H * turned);
-    }
-  }
-  if (has_stranger(*best)) return false;
-  confirmed.push_back(*best);
-  return true;
-}
-
-void EdgesDetector::Work::search_regions(const cv::Mat& grey, int row_step, Stopwatch& stopwatch) {
-  find_quads(segmentation, row_step, kLeastRegions, quads);
-  stopwatch.lap("quads");
-  const auto n = std::get<SquaresLayout>(target.layout).squares.size();
-  order.resize(quads.size());
-  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(),
-                   [this](size_t a, size_t b) { return quads[a].around < quads[b].around; });
-  for (size_t first = 0; first < order.size();) {
-    size_t last = first;
-    while (last < order.size() && quads[order[last]].around == quads[order[first]].around) ++last;
-    members.assign(order.begin() + static_cast<std::ptrdiff_t>(first),
-                   order.begin() + static_cast<std::ptrdiff_t>(last));
-    first = last;
-    if (members.size() < kLeastRegions) continue;
-    const auto known = [&](size_t i) {
-      return std::ranges::any_of(confirmed,
-                                 [&](const Confirmed& c) { return holds(c, quads[i].seen.centre); });
-    };
-    if (std::ranges::any_of(members, known)) continue;
-    if (members.size() == n) {
-      hypotheses.of_group(quads, members, camera, proposed);
-      stopwatch.lap("hypotheses");
-      const bool found = try_hypotheses(grey);
-      stopwatch.lap("verify");
-      if (found) continue;
-    }
-    // The largest first: they reach farthest.
-    std::stable_sort(members.begin(), members.end(),
-                     [this](size_t a, size_t b) { return quads[a].side_px > quads[b].side_px; });
-    int seeds = 0;
-    for (const size_t seed : members) {
-      if (!quads[seed].four_sided || known(seed)) continue;
-      if (++seeds > 12) break;
-      hypotheses.of_seed(quads, seed, camera, proposed);
-      stopwatch.lap("hypotheses");
-      if (!proposed.empty()) try_hypotheses(grey);
-      stopwatch.lap("verify");
-    }
-  }
-}
-
 std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const Prediction& prediction) {
   const auto& [mean, covariance] = prediction.camera_from_target;
   const Eigen::Matrix3d R = mean.rotation.toRotationMatrix();
@@ -261,6 +151,47 @@ std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const 
   if (!(radius < 0.5 * focal * target.size / distance)) return std::nullopt;
   return confirmation.confirm(grey, H, std::clamp(radius, 2.0, kPredictionRadius),
                               {1, 2, options.min_found, options.min_contrast});
+}
+
+// In the whole picture: what one threshold shows, and where that is nothing, ever more local ones.
+void EdgesDetector::Work::search(const cv::Mat& grey, Stopwatch& stopwatch) {
+  const GreyRange range = sampled_grey_range(grey, 7);
+  const uint8_t level = threshold_level(range, options.threshold_fraction);
+  detection.threshold = level;
+  segment(grey, level, 2, kLeastPixels, segmentation);
+  stopwatch.lap("segmentation");
+  regions.search(grey, segmentation, {.row_step = 2}, stopwatch, confirmed);
+  if (!confirmed.empty()) return;
+  contrast.threshold(grey, options.min_contrast, segmentation.image);
+  segment_runs(kLeastPixels, segmentation);
+  stopwatch.lap("local segmentation");
+  regions.search(grey, segmentation, {}, stopwatch, confirmed);
+  search_means(grey, regions, stopwatch);
+  const cv::Mat* last = &grey;
+  for (size_t k = 0; k < halves.size() && confirmed.empty(); ++k) {
+    halve(*last, halves[k].grey);
+    last = &halves[k].grey;
+    search_means(*last, halves[k].regions, stopwatch);
+    for (Confirmed& found : confirmed) {
+      // At full size, if that is not where it drowns in noise.
+      const double radius = 2 << k;
+      const Requirement requirement{kLeastSquares, 2, options.min_found, options.min_contrast};
+      if (const auto sharper = confirmation.confirm(grey, found.image_from_plane, radius, requirement)) {
+        found = *sharper;
+      } else {
+        found.blur = std::clamp(found.blur * (2 << k), 0.5, 3.0);
+      }
+    }
+  }
+}
+
+void EdgesDetector::Work::search_means(const cv::Mat& grey, RegionSearch& search_regions,
+                                       Stopwatch& stopwatch) {
+  if (!confirmed.empty()) return;
+  local_mean.threshold(grey, kReach, static_cast<int>(options.min_contrast / 2), segmentation.image);
+  segment_runs(kLeastPixels, segmentation);
+  stopwatch.lap("local segmentation");
+  search_regions.search(grey, segmentation, {.pooled = true}, stopwatch, confirmed);
 }
 
 // Where the target's corners are, as far as they are in the picture.
@@ -287,15 +218,15 @@ bool EdgesDetector::Work::is_outline(const EdgePiece& piece) const {
 // is not linear does to it is less by its smaller modulation, from a dark ground to a pale one by the power
 // 1.25 of it for sRGB; what light spread in the lens does is not.
 void EdgesDetector::Work::share_growth() {
-  const auto is_outline = [&](size_t i) { return on_ground[static_cast<size_t>(measured[i])] != 0; };
+  const auto by_ground = [&](size_t i) { return on_ground[static_cast<size_t>(measured[i])] != 0; };
   double sum = 0, count = 0;
   for (size_t i = 0; i < offsets.size(); ++i) {
-    if (is_outline(i)) continue;
+    if (by_ground(i)) continue;
     sum += offsets[i].modulation;
     count += 1;
   }
   for (size_t i = 0; i < offsets.size(); ++i) {
-    if (!is_outline(i)) continue;
+    if (!by_ground(i)) continue;
     const double part = std::min(offsets[i].modulation * count / std::max(sum, 1e-9), 1.0);
     offsets[i].white = -std::pow(part, 1.25);
     offsets[i].outline = -1;
@@ -326,7 +257,8 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
     H = towards_camera(corrected(H, plane.frame, fit.step));
     // What is left of half a tenth of a pixel after one step is nothing.
     if (round > 0 && fit.step.norm() * plane.frame.radius * camera.intrinsics()[0] < 0.15) break;
-    how = {options.lines_per_edge, std::sqrt(0.5 * edge_fit.blur().trace()), options.min_contrast};
+    const double blur = std::max(std::sqrt(0.5 * edge_fit.blur().trace()), kSharpest);
+    how = {options.lines_per_edge, blur, options.min_contrast};
   }
   plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
   plane.image_from_plane = H;
@@ -384,20 +316,7 @@ const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<
     if (const auto followed = w.follow(grey, *prediction)) w.confirmed.push_back(*followed);
     stopwatch.lap("follow");
   }
-  if (w.confirmed.empty()) {
-    const GreyRange range = sampled_grey_range(grey, 7);
-    const uint8_t level = threshold_level(range, w.options.threshold_fraction);
-    w.detection.threshold = level;
-    segment(grey, level, 2, kLeastPixels, w.segmentation);
-    stopwatch.lap("segmentation");
-    w.search_regions(grey, 2, stopwatch);
-  }
-  if (w.confirmed.empty()) {
-    w.contrast.threshold(grey, w.options.min_contrast, w.segmentation.image);
-    segment_runs(kLeastPixels, w.segmentation);
-    stopwatch.lap("local segmentation");
-    w.search_regions(grey, 1, stopwatch);
-  }
+  if (w.confirmed.empty()) w.search(grey, stopwatch);
   if (w.confirmed.empty()) return w.detection;
   if (w.confirmed.size() > 1) {
     w.detection.status = DetectionStatus::kAmbiguous;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "perch/detection/confirm.h"
+#include "perch/detection/edge_piece.h"
 #include "perch/geometry/homography.h"
 
 namespace perch {
@@ -13,11 +15,8 @@ namespace {
 // Squares smaller than this are known by their centres better than by their corners.
 constexpr double kByCorners = 9;  // px
 
-std::optional<Eigen::Vector2d> ideal(const CameraModel& camera, const Eigen::Vector2d& pixel) {
-  const auto ray = camera.ray_from_pixel(pixel);
-  if (!ray || !(ray->z() > 0)) return std::nullopt;
-  return ray->hnormalized();
-}
+// The perspective of a smaller one drowns in the noise of its corners.
+constexpr double kByPerspective = 16;  // px
 
 // The affine map that fits best: far away the perspective drowns in the noise.
 std::optional<Eigen::Matrix3d> affine_from_points(std::span<const Eigen::Vector2d> from,
@@ -36,163 +35,238 @@ std::optional<Eigen::Matrix3d> affine_from_points(std::span<const Eigen::Vector2
   return H;
 }
 
-Eigen::Matrix3d similarity(const Eigen::Vector2d& centre, double side, int quarter_turns) {
-  const double c = quarter_turns % 2 == 0 ? 1 - quarter_turns : 0;
-  const double s = quarter_turns % 2 == 0 ? 0 : 2 - quarter_turns;
+// From the plane to a unit square about the origin that is a square of the layout, turned by quarters.
+Eigen::Matrix3d unit_from_plane(const Eigen::Vector2d& centre, double side, int quarter_turns) {
+  const double c = (quarter_turns % 2 == 0 ? 1 - quarter_turns : 0) / side;
+  const double s = (quarter_turns % 2 == 0 ? 0 : 2 - quarter_turns) / side;
   Eigen::Matrix3d T;
-  T << c * side, -s * side, centre.x(), s * side, c * side, centre.y(), 0, 0, 1;
+  T << c, s, -c * centre.x() - s * centre.y(), -s, c, s * centre.x() - c * centre.y(), 0, 0, 1;
   return T;
+}
+
+// From the unit square about the origin to the four corners of a region.
+std::optional<Eigen::Matrix3d> from_unit_square(const std::array<Eigen::Vector2d, 4>& corners,
+                                                bool perspective) {
+  if (perspective) {
+    const auto H = homography_from_points(square_corners({-0.5, -0.5}, 1), corners);
+    return H ? std::optional(towards_camera(*H)) : std::nullopt;
+  }
+  const auto& [upper_right, upper_left, lower_left, lower_right] = corners;
+  Eigen::Matrix3d H = Eigen::Matrix3d::Identity();
+  H.col(0).head<2>() = 0.5 * (upper_right - upper_left + lower_right - lower_left);
+  H.col(1).head<2>() = 0.5 * (upper_right - lower_right + upper_left - lower_left);
+  H.col(2).head<2>() = 0.25 * (upper_right + upper_left + lower_left + lower_right);
+  return H;
 }
 
 }  // namespace
 
-Hypotheses::Hypotheses(const LandingTarget& target, const TargetEdges& edges)
-    : labelling_(Labelling::of(std::get<SquaresLayout>(target.layout))) {
+Hypotheses::Hypotheses(const LandingTarget& target, const TargetEdges& edges, const CameraModel& camera)
+    : camera_(camera),
+      px_(1 / camera.intrinsics()[0]),
+      size_(target.size),
+      labelling_(Labelling::of(std::get<SquaresLayout>(target.layout))) {
   scales_.resize(std::get<SquaresLayout>(target.layout).nested ? 2 : 1);
   for (const TargetShape& shape : edges.shapes) {
     if (shape.kind == ShapeKind::kSquare) scales_[shape.inner ? 1 : 0].push_back({shape.centre, shape.side});
   }
 }
 
-// Fits the homography to every square of the layout that has a region where it should be.
-std::optional<Hypothesis> Hypotheses::refined(std::span<const WhiteQuad> quads, int scale,
-                                              const Eigen::Matrix3d& first, const CameraModel& camera) {
-  Eigen::Matrix3d H = first;
-  Hypothesis hypothesis;
-  for (int round = 0; round < 2; ++round) {
-    const double tolerance = round == 0 ? 0.45 : 0.3;  // of a square's side
-    plane_.clear();
-    image_.clear();
-    hypothesis.squares = 0;
-    for (const LayoutSquare& square : scales_[static_cast<size_t>(scale)]) {
-      std::array<Eigen::Vector2d, 5> expected;  // corners, centre; px
-      bool visible = true;
-      const Quad corners =
-          square_corners(square.centre - Eigen::Vector2d::Constant(square.side / 2), square.side);
-      for (size_t k = 0; k < 5 && visible; ++k) {
-        const Eigen::Vector3d p = H * (k < 4 ? corners[k] : square.centre).homogeneous();
-        const auto pixel = p.z() > 0 ? camera.pixel_from_camera(p) : std::nullopt;
-        visible = pixel.has_value();
-        if (pixel) expected[k] = *pixel;
-      }
-      if (!visible) continue;
-      const double diagonals =
-          std::sqrt((expected[0] - expected[2]).norm() * (expected[1] - expected[3]).norm() / 2);
-      const Eigen::Vector2d a = expected[0] - expected[2], b = expected[1] - expected[3];
-      const double side = std::sqrt(std::abs(a.x() * b.y() - a.y() * b.x()) / 2);
-      const WhiteQuad* nearest = nullptr;
-      double distance = tolerance * diagonals + 1;
-      for (const size_t i : near_) {
-        const double d = (quads[i].seen.centre - expected[4]).norm();
-        if (d < distance && quads[i].side_px < 1.8 * side + 2 && quads[i].side_px > 0.5 * side - 1.5) {
-          distance = d;
-          nearest = &quads[i];
-        }
-      }
-      if (!nearest) continue;
-      ++hypothesis.squares;
-      const auto centre = ideal(camera, nearest->seen.centre);
-      if (!centre) continue;
-      plane_.push_back(square.centre);
-      image_.push_back(*centre);
-      if (!nearest->four_sided || nearest->side_px < kByCorners) continue;
-      // The seen corners in the order that comes nearest to the expected ones.
-      size_t turn = 0;
-      double least = std::numeric_limits<double>::infinity();
-      for (size_t t = 0; t < 4; ++t) {
-        double sum = 0;
-        for (size_t k = 0; k < 4; ++k)
-          sum += (nearest->seen.corners[(k + t) % 4] - expected[k]).squaredNorm();
-        if (sum < least) {
-          least = sum;
-          turn = t;
-        }
-      }
-      for (size_t k = 0; k < 4; ++k) {
-        const auto corner = ideal(camera, nearest->seen.corners[(k + turn) % 4]);
-        if (!corner) continue;
-        plane_.push_back(corners[k]);
-        image_.push_back(*corner);
-      }
-    }
-    // Eight corners do, but not two centres.
-    if (hypothesis.squares < 3 && plane_.size() < 10) return std::nullopt;
-    const bool corners_seen = plane_.size() > static_cast<size_t>(hypothesis.squares);
-    const auto fitted =
-        corners_seen ? homography_from_points(plane_, image_) : affine_from_points(plane_, image_);
-    if (!fitted) return std::nullopt;
-    H = (*fitted)(2, 2) < 0 ? Eigen::Matrix3d(-*fitted) : *fitted;
-  }
-  hypothesis.image_from_plane = H;
-  return hypothesis;
+void Hypotheses::begin(std::span<const WhiteQuad> quads) {
+  quads_ = quads;
+  marks_.assign(quads.size(), {});
 }
 
-void Hypotheses::of_seed(std::span<const WhiteQuad> quads, size_t seed, const CameraModel& camera,
-                         std::vector<Hypothesis>& hypotheses) {
+// Made when it is first asked for: most regions are never looked at.
+const Hypotheses::Mark* Hypotheses::mark(size_t quad) {
+  Mark& m = marks_[quad];
+  if (m.tried) return m.seen ? &m : nullptr;
+  m.tried = true;
+  const auto ideal = [&](const Eigen::Vector2d& pixel, Eigen::Vector2d& point) {
+    const auto ray = camera_.ray_from_pixel(pixel);
+    if (!ray || !(ray->z() > 0)) return false;
+    point = ray->hnormalized();
+    return true;
+  };
+  m.seen = ideal(quads_[quad].seen.centre, m.centre);
+  for (size_t k = 0; k < 4 && m.seen && quads_[quad].four_sided; ++k)
+    m.seen = ideal(quads_[quad].seen.corners[k], m.corners[k]);
+  return m.seen ? &m : nullptr;
+}
+
+// The nearest region about where each square of the layout should be, if it is of about its size.
+void Hypotheses::match(int scale, const Eigen::Matrix3d& H, double tolerance) {
+  matches_.clear();
+  for (const LayoutSquare& square : scales_[static_cast<size_t>(scale)]) {
+    const Eigen::Vector3d p = H * square.centre.homogeneous();
+    if (!(p.z() > 0)) continue;
+    const Eigen::Vector2d centre = p.hnormalized();
+    const Eigen::Matrix2d by_q = (H.topLeftCorner<2, 2>() - centre * H.row(2).head<2>()) / p.z();
+    const double side_px = std::sqrt(std::abs(by_q.determinant())) * square.side / px_;
+    double nearest = tolerance * std::sqrt(by_q.col(0).norm() * by_q.col(1).norm()) * square.side + px_;
+    nearest *= nearest;
+    Match found{&square, quads_.size()};
+    for (const size_t i : near_) {
+      const double distance = (marks_[i].centre - centre).squaredNorm();
+      const double side = quads_[i].side_px;
+      if (distance < nearest && side < 1.8 * side_px + 2 && side > 0.5 * side_px - 1.5) {
+        nearest = distance;
+        found.quad = i;
+      }
+    }
+    if (found.quad < quads_.size()) matches_.push_back(found);
+  }
+}
+
+// Three squares, or two with eight corners.
+bool Hypotheses::is_enough() const {
+  return matches_.size() >= 3 || (matches_.size() == 2 && std::ranges::all_of(matches_, [&](const Match& m) {
+                                    return quads_[m.quad].four_sided && quads_[m.quad].side_px >= kByCorners;
+                                  }));
+}
+
+// The homography that fits best to the matched squares.
+std::optional<Eigen::Matrix3d> Hypotheses::fitted(const Eigen::Matrix3d& H) {
+  plane_.clear();
+  image_.clear();
+  for (const auto& [square, quad] : matches_) {
+    const Mark& m = marks_[quad];
+    plane_.push_back(square->centre);
+    image_.push_back(m.centre);
+    if (!quads_[quad].four_sided || quads_[quad].side_px < kByCorners) continue;
+    const Quad corners =
+        square_corners(square->centre - Eigen::Vector2d::Constant(square->side / 2), square->side);
+    // The seen corners in the order that comes nearest to the expected ones.
+    size_t turn = 0;
+    double least = std::numeric_limits<double>::infinity();
+    std::array<Eigen::Vector2d, 4> expected;
+    for (size_t k = 0; k < 4; ++k) expected[k] = (H * corners[k].homogeneous()).hnormalized();
+    for (size_t t = 0; t < 4; ++t) {
+      double sum = 0;
+      for (size_t k = 0; k < 4; ++k) sum += (m.corners[(k + t) % 4] - expected[k]).squaredNorm();
+      if (sum < least) {
+        least = sum;
+        turn = t;
+      }
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      plane_.push_back(corners[k]);
+      image_.push_back(m.corners[(k + turn) % 4]);
+    }
+  }
+  const bool corners_seen = plane_.size() > matches_.size();
+  return corners_seen ? homography_from_points(plane_, image_) : by_centres();
+}
+
+// Of few small squares: the affine map, and as much of a perspective as the centres ask for against what is
+// possible at all.
+std::optional<Eigen::Matrix3d> Hypotheses::by_centres() {
+  auto H = affine_from_points(plane_, image_);
+  if (!H || plane_.size() < 5) return H;
+  const ImageFrame frame = frame_of(*H, Eigen::Vector2d::Zero(), size_);
+  offsets_.clear();
+  for (size_t i = 0; i < plane_.size(); ++i) {
+    const Eigen::Vector2d at = (*H * plane_[i].homogeneous()).hnormalized();
+    for (int axis = 0; axis < 2; ++axis) {
+      EdgeOffset offset;
+      const Eigen::Vector2d gradient = Eigen::Vector2d::Unit(axis) / px_;
+      offset.jacobian = step_jacobian(at, gradient, frame);
+      offset.offset = gradient.dot(image_[i] - at);
+      offset.sigma = 0.3;  // px, of the centre of a small region
+      offsets_.push_back(offset);
+    }
+  }
+  return corrected(*H, frame, fit_plane(offsets_, frame, 0.3, 1).step);
+}
+
+// Fits the homography to every square of the layout that has a region where it should be.
+std::optional<Hypothesis> Hypotheses::refined(int scale, const Eigen::Matrix3d& first) {
+  Eigen::Matrix3d H = first;
+  for (const double tolerance : {0.45, 0.3}) {  // of a square's side
+    match(scale, H, tolerance);
+    if (!is_enough()) return std::nullopt;
+    const auto better = fitted(H);
+    if (!better) return std::nullopt;
+    H = towards_camera(*better);
+  }
+  return Hypothesis{H, static_cast<int>(matches_.size())};
+}
+
+void Hypotheses::of_seed(size_t seed, std::span<const size_t> members, std::vector<Hypothesis>& hypotheses) {
   hypotheses.clear();
-  const WhiteQuad& quad = quads[seed];
+  const WhiteQuad& quad = quads_[seed];
+  const Mark* own = mark(seed);
+  if (!own || !quad.four_sided) return;
   near_.clear();
-  for (size_t i = 0; i < quads.size(); ++i) {
-    const double distance = (quads[i].seen.centre - quad.seen.centre).norm();
-    if (quads[i].around == quad.around && distance < 14 * quad.side_px) near_.push_back(i);
+  // At 75 degrees a square looks half as large as it is long, and the farthest ones of the paper's layout are
+  // six sides of a small one apart; the largest is 2.5 times as large as the smallest.
+  for (const size_t i : members) {
+    const double distance = (quads_[i].seen.centre - quad.seen.centre).squaredNorm();
+    const double side = quads_[i].side_px;
+    if (distance < std::pow(14 * quad.side_px, 2) && side < 4 * quad.side_px + 2 &&
+        4 * side > quad.side_px - 2 && mark(i)) {
+      near_.push_back(i);
+    }
   }
   if (near_.size() < 2) return;
-  const Quad unit = square_corners({-0.5, -0.5}, 1);
-  std::array<Eigen::Vector2d, 4> image;
-  for (size_t k = 0; k < 4; ++k) {
-    const auto corner = ideal(camera, quad.seen.corners[k]);
-    if (!corner) return;
-    image[k] = *corner;
-  }
-  auto from_unit = homography_from_points(unit, image);
+  const auto from_unit = from_unit_square(own->corners, quad.side_px >= kByPerspective);
   if (!from_unit) return;
-  if ((*from_unit)(2, 2) < 0) *from_unit = -*from_unit;
   for (int scale = 0; scale < static_cast<int>(scales_.size()); ++scale) {
     for (const LayoutSquare& square : scales_[static_cast<size_t>(scale)]) {
       for (int turns = 0; turns < 4; ++turns) {
-        const Eigen::Matrix3d H = *from_unit * similarity(square.centre, square.side, turns).inverse();
-        if (const auto better = refined(quads, scale, H, camera)) hypotheses.push_back(*better);
+        const Eigen::Matrix3d H = *from_unit * unit_from_plane(square.centre, square.side, turns);
+        if (!(H(2, 2) > 0)) continue;
+        if (const auto better = refined(scale, H)) hypotheses.push_back(*better);
       }
     }
   }
-  std::stable_sort(hypotheses.begin(), hypotheses.end(),
-                   [](const Hypothesis& a, const Hypothesis& b) { return a.squares > b.squares; });
+  std::ranges::sort(hypotheses,
+                    [](const Hypothesis& a, const Hypothesis& b) { return a.squares > b.squares; });
   if (hypotheses.size() > 6) hypotheses.resize(6);
 }
 
-void Hypotheses::of_group(std::span<const WhiteQuad> quads, std::span<const size_t> members,
-                          const CameraModel& camera, std::vector<Hypothesis>& hypotheses) {
+void Hypotheses::of_group(std::span<const size_t> members, std::vector<Hypothesis>& hypotheses) {
   hypotheses.clear();
   if (!labelling_) return;
   seen_.clear();
-  near_.assign(members.begin(), members.end());
   for (const size_t i : members) {
-    seen_.push_back(quads[i].seen);
+    if (!mark(i)) return;
+    seen_.push_back(quads_[i].seen);
     seen_.back().component = static_cast<int>(i);
   }
   if (!labelling_->label(seen_, labelled_)) return;
   // All corners, or where they are too small the centres alone.
-  double smallest = quads[members[0]].side_px;
-  for (const size_t i : members) smallest = std::min(smallest, quads[i].side_px);
+  double smallest = quads_[members[0]].side_px;
+  for (const size_t i : members) smallest = std::min(smallest, quads_[i].side_px);
   const bool by_corners = smallest >= kByCorners;
   image_.clear();
   for (const SeenSquare& square : labelled_) {
-    for (size_t k = 0; k < (by_corners ? 4 : 1); ++k) {
-      const auto point = ideal(camera, by_corners ? square.corners[k] : square.centre);
-      if (!point) return;
-      image_.push_back(*point);
+    const Mark& m = marks_[static_cast<size_t>(square.component)];
+    if (!by_corners) {
+      image_.push_back(m.centre);
+      continue;
+    }
+    // In the labels' order, which is that of the pixels.
+    const auto& own = quads_[static_cast<size_t>(square.component)].seen.corners;
+    for (const Eigen::Vector2d& corner : square.corners) {
+      const auto k = static_cast<size_t>(std::ranges::find(own, corner) - own.begin());
+      if (k == 4) return;
+      image_.push_back(m.corners[k]);
     }
   }
   for (const auto& squares : scales_) {
     plane_.clear();
     for (const LayoutSquare& square : squares) {
+      if (!by_corners) {
+        plane_.push_back(square.centre);
+        continue;
+      }
       const Quad corners =
           square_corners(square.centre - Eigen::Vector2d::Constant(square.side / 2), square.side);
-      for (size_t k = 0; k < (by_corners ? 4 : 1); ++k)
-        plane_.push_back(by_corners ? corners[k] : square.centre);
+      plane_.insert(plane_.end(), corners.begin(), corners.end());
     }
-    const auto H = by_corners ? homography_from_points(plane_, image_) : affine_from_points(plane_, image_);
-    if (H) hypotheses.push_back({*H, static_cast<int>(squares.size())});
+    const auto H = by_corners ? homography_from_points(plane_, image_) : by_centres();
+    if (H) hypotheses.push_back({towards_camera(*H), static_cast<int>(squares.size())});
   }
 }
 

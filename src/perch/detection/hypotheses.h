@@ -7,6 +7,7 @@
 
 #include "perch/camera/camera_model.h"
 #include "perch/detection/labelling.h"
+#include "perch/detection/plane_fit.h"
 #include "perch/detection/quads.h"
 #include "perch/target/edges.h"
 #include "perch/target/landing_target.h"
@@ -24,29 +25,50 @@ struct Hypothesis {
 // its neighbours then comes to lie where squares are, counts.
 class Hypotheses {
  public:
-  Hypotheses(const LandingTarget& target, const TargetEdges& edges);
+  Hypotheses(const LandingTarget& target, const TargetEdges& edges, const CameraModel& camera);
 
-  // All those with the region `seed` as one of their squares and two more at least, or one whose corners are
-  // measured too, the best first.
-  void of_seed(std::span<const WhiteQuad> quads, size_t seed, const CameraModel& camera,
-               std::vector<Hypothesis>& hypotheses);
+  // The regions of a picture, which must outlive the calls below.
+  void begin(std::span<const WhiteQuad> quads);
+  // All those with the region `seed` as one of their squares and two more of `members` at least, or one whose
+  // corners are measured too, the best first.
+  void of_seed(size_t seed, std::span<const size_t> members, std::vector<Hypothesis>& hypotheses);
   // Those of a black region with as many white ones as the layout has squares; `members` are indices.
-  void of_group(std::span<const WhiteQuad> quads, std::span<const size_t> members, const CameraModel& camera,
-                std::vector<Hypothesis>& hypotheses);
+  void of_group(std::span<const size_t> members, std::vector<Hypothesis>& hypotheses);
 
  private:
   struct LayoutSquare {
     Eigen::Vector2d centre;
     double side;
   };
-  std::optional<Hypothesis> refined(std::span<const WhiteQuad> quads, int scale, const Eigen::Matrix3d& H,
-                                    const CameraModel& camera);
+  // A region in the ideal image.
+  struct Mark {
+    bool tried = false, seen = false;
+    Eigen::Vector2d centre;
+    std::array<Eigen::Vector2d, 4> corners;
+  };
+  struct Match {
+    const LayoutSquare* square;
+    size_t quad;
+  };
+  const Mark* mark(size_t quad);
+  void match(int scale, const Eigen::Matrix3d& H, double tolerance);
+  bool is_enough() const;
+  std::optional<Eigen::Matrix3d> fitted(const Eigen::Matrix3d& H);
+  std::optional<Eigen::Matrix3d> by_centres();
+  std::optional<Hypothesis> refined(int scale, const Eigen::Matrix3d& H);
 
+  CameraModel camera_;
+  double px_;                                      // in the ideal image
+  double size_;                                    // of the target, m
   std::vector<std::vector<LayoutSquare>> scales_;  // the outer squares, the inner ones
   std::optional<Labelling> labelling_;
+  std::span<const WhiteQuad> quads_;
+  std::vector<Mark> marks_;
   std::vector<size_t> near_;
+  std::vector<Match> matches_;
   std::vector<SeenSquare> seen_, labelled_;
   std::vector<Eigen::Vector2d> plane_, image_;
+  std::vector<EdgeOffset> offsets_;
 };
 
 }  // namespace perch

@@ -1,7 +1,6 @@
 #include "perch/detection/local_contrast.h"
 
 #include <algorithm>
-#include <bit>
 #include <opencv2/core/hal/intrin.hpp>
 
 namespace perch {
@@ -113,8 +112,7 @@ void LocalContrast::threshold(const cv::Mat& grey, double min_contrast, RunImage
   image.rows.clear();
   image.runs.clear();
   const Level& finest = levels_[0];
-  const int words = (grey.cols + 15) / 16;
-  row_.resize(static_cast<size_t>(16 * words));
+  row_.resize(static_cast<size_t>(kTile * finest.columns));
   for (int y = 0; y < grey.rows; ++y) {
     if (y % kTile == 0) {
       const Tile* tiles =
@@ -123,30 +121,7 @@ void LocalContrast::threshold(const cv::Mat& grey, double min_contrast, RunImage
         std::fill_n(row_.data() + kTile * x, kTile, tiles[x].low);
       }
     }
-    const uint8_t* pixels = grey.ptr<uint8_t>(y);
-    const auto white = [&](int x) { return pixels[x] > row_[static_cast<size_t>(x)]; };
-    const int first = static_cast<int>(image.runs.size());
-    const bool first_white = white(0);
-    uint32_t before = first_white ? 1 : 0;
-    int begin = 0;
-    for (int x = 0; x < grey.cols; x += 16) {
-      const int count = std::min(16, grey.cols - x);
-      uint32_t bits = 0;
-      if (count == 16) {
-        bits = static_cast<uint32_t>(cv::v_signmask(cv::v_load(pixels + x) > cv::v_load(row_.data() + x)));
-      } else {
-        for (int i = 0; i < count; ++i) bits |= static_cast<uint32_t>(white(x + i)) << i;
-      }
-      uint32_t changes = (bits ^ ((bits << 1) | before)) & ((uint32_t{1} << count) - 1);
-      for (; changes != 0; changes &= changes - 1) {
-        const int column = x + std::countr_zero(changes);
-        image.runs.push_back({begin, column, 0});
-        begin = column;
-      }
-      before = (bits >> (count - 1)) & 1;
-    }
-    image.runs.push_back({begin, grey.cols, 0});
-    image.rows.push_back({first, static_cast<int>(image.runs.size()) - first, first_white});
+    append_row(grey.ptr<uint8_t>(y), row_.data(), image);
   }
 }
 

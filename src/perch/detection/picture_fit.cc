@@ -66,6 +66,7 @@ struct PictureFit::Pass {
   Unknowns b = Unknowns::Zero();
   double squares = 0, weights = 0;                // of pixels without ground
   double ground_squares = 0, ground_weights = 0;  // of pixels that are ground
+  double neighbours = 0, pairs = 0;               // products of one pixel's with the next one's
   int crossed = 0;
 };
 
@@ -76,15 +77,27 @@ PictureFit::Pass PictureFit::take(const cv::Mat& grey, const Noise& noise, bool 
   // Every second row is enough for levels.
   for (int y = model_.first_row(); y <= model_.last_row(); y += levels_only ? 2 : 1) {
     const uint8_t* line = grey.ptr<uint8_t>(y);
+    double last = 0;
+    bool has_last = false;
     for (int x = model_.first_column(); x <= model_.last_column(); ++x) {
-      if (!model_.row_of(x, y, line[x], row)) continue;
+      if (!model_.row_of(x, y, line[x], row)) {
+        has_last = false;
+        continue;
+      }
       const double r = static_cast<double>(row.d[PictureRow::kResidual]),
                    ground = static_cast<double>(row.ground);
       const double variance = noise.pixel + kTogether * noise.ground * ground * ground;
       const double loss = levels_only ? 1 : 1 / (1 + r * r / (kCauchy * kCauchy * variance));
       products.add(row, static_cast<float>(loss / variance));
       pass.crossed += !row.flat;
-      if (ground < 0.02) {
+      const bool on_target = ground < 0.02;
+      if (on_target && has_last) {
+        pass.neighbours += last * std::sqrt(loss) * r;
+        pass.pairs += 1;
+      }
+      last = std::sqrt(loss) * r;
+      has_last = on_target;
+      if (on_target) {
         pass.squares += loss * r * r;
         pass.weights += loss;
       } else if (ground > 0.8) {
@@ -98,11 +111,21 @@ PictureFit::Pass PictureFit::take(const cv::Mat& grey, const Noise& noise, bool 
 }
 
 // The loss takes some of the noise for outliers: a tenth.
-PictureFit::Noise PictureFit::noise_of(const Pass& pass) const {
+PictureFit::Noise PictureFit::noise_of(const Pass& pass) {
   Noise noise;
   noise.pixel = 1.1 * (pass.squares + 4) / (pass.weights + 4) + 1.0 / 12;
   noise.ground = std::max(0.0, 1.1 * pass.ground_squares / std::max(pass.ground_weights, 1.0) - noise.pixel);
   return noise;
+}
+
+// How many of a pixel's neighbours err as it does, of noise none: what the model does not know (a shadow's
+// edge, dirt) goes on from pixel to pixel. As of a process that forgets by the same part in each direction.
+double PictureFit::together(const Pass& pass) {
+  constexpr double kOfNoise = 0.05;  // correlations of a few thousand pixels that are nothing
+  const double mean = pass.squares / std::max(pass.weights, 1.0);
+  const double correlation = pass.neighbours / std::max(pass.pairs, 1.0) / std::max(mean, 1e-3);
+  const double part = std::clamp(correlation - kOfNoise, 0.0, 0.9);
+  return std::pow((1 + part) / (1 - part), 2);
 }
 
 std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
@@ -161,16 +184,19 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
     p.growth = std::clamp(p.growth + x(PictureRow::kGrowth), -1.0, 1.0);
     p.outline_growth = std::clamp(p.outline_growth + x(PictureRow::kGrowth + 1), -0.5, 0.5);
     fitted.pixels = pass.crossed;
-    fitted.misfit = std::sqrt(noise.pixel / 4);
+    fitted.together = together(pass);
     // Ends when the step is a tenth of its own deviation.
     done = round > 1 && step.dot(information.topLeftCorner<8, 8>() * step) < 0.1;
   }
   const double step = p.white.x() - p.black;
-  if (!done || !(step > contrast)) return std::nullopt;
+  // More of it, and the picture is not what the model says it is.
+  constexpr double kMostTogether = 10;
+  if (!done || !(step > contrast) || fitted.together > kMostTogether) return std::nullopt;
   constexpr int kRest = kUnknowns - 8;
   const Eigen::Matrix<double, 8, kRest> by_rest = information.topRightCorner<8, kRest>();
   const Eigen::Matrix<double, kRest, kRest> rest = information.bottomRightCorner<kRest, kRest>();
   fitted.information = information.topLeftCorner<8, 8>() - by_rest * rest.ldlt().solve(by_rest.transpose());
+  fitted.information /= fitted.together;
   fitted.image_from_plane = H;
   fitted.frame = frame_of(H, Eigen::Vector2d::Zero(), size);
   fitted.growth = p.growth;

@@ -14,9 +14,9 @@ struct PictureFitted {
   ImageFrame frame;
   PlaneInformation information = PlaneInformation::Zero();  // of a PlaneStep about it, the rest accounted for
   double growth = 0;                                        // px
-  double rms_px = 0;  // of the grey levels left, as a shift of the edges that they would be
-  double misfit = 1;  // deviation of the levels left over that of the noise alone
-  int pixels = 0;     // that an edge crosses
+  double rms_px = 0;    // of the grey levels left, as a shift of the edges that they would be
+  double together = 1;  // pixels that err alike, which the information counts as one
+  int pixels = 0;       // that an edge crosses
 };
 
 // Fits the picture of a small target to its grey levels: the homography, blur, growth of white, and the
@@ -38,7 +38,8 @@ class PictureFit {
   };
   struct Pass;
   Pass take(const cv::Mat& grey, const Noise& noise, bool levels_only);
-  Noise noise_of(const Pass& pass) const;
+  static Noise noise_of(const Pass& pass);
+  static double together(const Pass& pass);
 
   PictureModel model_;
 };

@@ -8,9 +8,6 @@
 namespace perch {
 namespace {
 
-// From here on the corners of a region say more than its box.
-constexpr double kSmallestMeasured = 5;  // px
-
 // Adds the next row's end to one side of a convex outline (`side` 1: the right one).
 void extend(std::vector<Eigen::Vector2d>& chain, const Eigen::Vector2d& p, double side) {
   while (chain.size() >= 2) {
@@ -22,13 +19,24 @@ void extend(std::vector<Eigen::Vector2d>& chain, const Eigen::Vector2d& p, doubl
   chain.push_back(p);
 }
 
-struct Outline {
-  std::vector<Eigen::Vector2d> left, right;
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
-  double area = 0;  // px, holes filled
-};
+std::array<Eigen::Vector2d, 4> box_corners(const Component& c, int row_step) {
+  const double left = c.left, right = c.right, top = c.top * row_step, bottom = c.bottom * row_step;
+  return {Eigen::Vector2d(right, top), {left, top}, {left, bottom}, {right, bottom}};
+}
 
-void trace(const RunImage& image, const Component& component, int label, int row_step, Outline& outline) {
+double area_of(const std::array<Eigen::Vector2d, 4>& corners) {
+  double twice = 0;
+  for (size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % 4];
+    twice += b.x() * a.y() - a.x() * b.y();
+  }
+  return twice / 2;
+}
+
+}  // namespace
+
+void QuadTracer::trace(const RunImage& image, const Component& component, int label, int row_step,
+                       Outline& outline) {
   outline.left.clear();
   outline.right.clear();
   outline.centre.setZero();
@@ -55,25 +63,8 @@ void trace(const RunImage& image, const Component& component, int label, int row
   outline.centre /= std::max(outline.area, 1.0);
 }
 
-std::array<Eigen::Vector2d, 4> box_corners(const Component& c, int row_step) {
-  const double left = c.left, right = c.right, top = c.top * row_step, bottom = c.bottom * row_step;
-  return {Eigen::Vector2d(right, top), {left, top}, {left, bottom}, {right, bottom}};
-}
-
-double area_of(const std::array<Eigen::Vector2d, 4>& corners) {
-  double twice = 0;
-  for (size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % 4];
-    twice += b.x() * a.y() - a.x() * b.y();
-  }
-  return twice / 2;
-}
-
-}  // namespace
-
-void find_quads(const Segmentation& s, int row_step, int siblings, std::vector<WhiteQuad>& quads) {
+void list_quads(const Segmentation& s, int row_step, int siblings, std::vector<WhiteQuad>& quads) {
   quads.clear();
-  Outline outline;
   const auto count = static_cast<int>(s.components.list.size());
   for (int label = 1; label < count; ++label) {
     const Component& c = s.at(label);
@@ -85,25 +76,29 @@ void find_quads(const Segmentation& s, int row_step, int siblings, std::vector<W
     if (c.area * row_step * 5 < width * height) continue;
     WhiteQuad quad;
     quad.around = around;
-    trace(s.image, c, label, row_step, outline);
-    quad.side_px = std::sqrt(outline.area);
-    quad.seen.centre = outline.centre;
     quad.seen.corners = box_corners(c, row_step);
+    quad.seen.centre = 0.5 * (quad.seen.corners[0] + quad.seen.corners[2]);
     quad.seen.component = label;
-    if (quad.side_px >= kSmallestMeasured) {
-      outline.left.insert(outline.left.end(), outline.right.begin(), outline.right.end());
-      const auto corners = quad_corners(outline.left, outline.centre);
-      if (!corners) continue;
-      quad.seen.corners = *corners;
-      for (auto& corner : quad.seen.corners) {
-        corner += 0.7 * (corner - quad.seen.centre).normalized();
-      }
-      const double area = area_of(quad.seen.corners);
-      quad.four_sided = std::abs(area - outline.area) < 0.2 * outline.area + 2 * quad.side_px;
-      if (!quad.four_sided) continue;
-    }
+    quad.side_px = std::sqrt(static_cast<double>(c.area * row_step));
     quads.push_back(quad);
   }
+}
+
+bool QuadTracer::measure(const Segmentation& s, int row_step, WhiteQuad& quad) {
+  const int label = quad.seen.component;
+  trace(s.image, s.at(label), label, row_step, outline_);
+  quad.measured = true;
+  quad.side_px = std::sqrt(outline_.area);
+  quad.seen.centre = outline_.centre;
+  if (quad.side_px < kSmallestMeasured) return true;
+  outline_.left.insert(outline_.left.end(), outline_.right.begin(), outline_.right.end());
+  const auto corners = quad_corners(outline_.left, outline_.centre);
+  if (!corners) return false;
+  quad.seen.corners = *corners;
+  for (auto& corner : quad.seen.corners) corner += 0.7 * (corner - quad.seen.centre).normalized();
+  const double area = area_of(quad.seen.corners);
+  quad.four_sided = std::abs(area - outline_.area) < 0.2 * outline_.area + 2 * quad.side_px;
+  return quad.four_sided;
 }
 
 }  // namespace perch

@@ -68,7 +68,45 @@ int* colour_changes(const uint8_t* pixels, int width, uint8_t level, int* column
   return columns;
 }
 
+// The same against a level for every pixel.
+PERCH_BIT_INSTRUCTIONS
+int* colour_changes(const uint8_t* pixels, const uint8_t* levels, int width, int* columns) {
+  uint32_t before = pixels[0] > levels[0] ? 1 : 0;
+  int x = 0;
+  for (; x + 16 <= width; x += 16) {
+    const auto bits = static_cast<uint32_t>(cv::v_signmask(cv::v_load(pixels + x) > cv::v_load(levels + x)));
+    columns = append_columns((bits ^ ((bits << 1) | before)) & 0xFFFF, x, columns);
+    before = bits >> 15;
+  }
+  for (; x < width; ++x) {
+    const uint32_t white = pixels[x] > levels[x] ? 1 : 0;
+    if (white != before) *columns++ = x;
+    before = white;
+  }
+  return columns;
+}
+
+// Appends a row that changes its colour at the columns of `image.ends`, up to `last`, which has room for one
+// more.
+void append_runs(int* last, bool first_white, RunImage& image) {
+  *last = image.width;
+  const auto first = image.runs.size();
+  const auto count = static_cast<size_t>(last - image.ends.data()) + 1;
+  image.runs.resize(first + count);
+  int begin = 0;
+  for (size_t k = 0; k < count; ++k) {
+    image.runs[first + k] = {begin, image.ends[k], 0};
+    begin = image.ends[k];
+  }
+  image.rows.push_back({static_cast<int>(first), static_cast<int>(count), first_white});
+}
+
 }  // namespace
+
+void append_row(const uint8_t* pixels, const uint8_t* levels, RunImage& image) {
+  image.ends.resize(static_cast<size_t>(image.width) + 1);
+  append_runs(colour_changes(pixels, levels, image.width, image.ends.data()), pixels[0] > levels[0], image);
+}
 
 void threshold_to_runs(const cv::Mat& grey, uint8_t level, int row_step, RunImage& image) {
   image.width = grey.cols;
@@ -77,17 +115,7 @@ void threshold_to_runs(const cv::Mat& grey, uint8_t level, int row_step, RunImag
   image.ends.resize(static_cast<size_t>(grey.cols) + 1);
   for (int y = 0; y < grey.rows; y += row_step) {
     const uint8_t* pixels = grey.ptr<uint8_t>(y);
-    int* const last = colour_changes(pixels, grey.cols, level, image.ends.data());
-    *last = grey.cols;
-    const auto first = image.runs.size();
-    const auto count = static_cast<size_t>(last - image.ends.data()) + 1;
-    image.runs.resize(first + count);
-    int begin = 0;
-    for (size_t k = 0; k < count; ++k) {
-      image.runs[first + k] = {begin, image.ends[k], 0};
-      begin = image.ends[k];
-    }
-    image.rows.push_back({static_cast<int>(first), static_cast<int>(count), pixels[0] > level});
+    append_runs(colour_changes(pixels, grey.cols, level, image.ends.data()), pixels[0] > level, image);
   }
 }
 

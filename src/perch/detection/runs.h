@@ -43,4 +43,7 @@ inline int label_at(const RunImage& image, int x, int y) {
 // memory.
 void threshold_to_runs(const cv::Mat& grey, uint8_t level, int row_step, RunImage& image);
 
+// Appends a row of `image.width` pixels, white where a pixel is above its own level.
+void append_row(const uint8_t* pixels, const uint8_t* levels, RunImage& image);
+
 }  // namespace perch
