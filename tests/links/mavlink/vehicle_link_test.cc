@@ -192,6 +192,18 @@ TEST(VehicleLink, AfterASmallStepOfTheClockNothingOfItsTimeIsLeft) {
   }
 }
 
+TEST(VehicleLink, BelievesNoStampWhileTheClockIsInDoubt) {
+  LinkedWorld world;
+  world.run(20);
+  world.autopilot.booted_ns += 100 * kMs;
+  for (int i = 0; i < 1000 && !world.link.clock().doubtful(); ++i) world.run(0.001);
+  ASSERT_TRUE(world.link.clock().doubtful());
+  const int64_t latest = world.link.history().attitudes().latest()->time_ns;
+  world.run(0.05);  // five attitudes, and no answer yet
+  ASSERT_TRUE(world.link.clock().doubtful());
+  EXPECT_EQ(world.link.history().attitudes().latest()->time_ns, latest);
+}
+
 TEST(VehicleLink, AnswersAQuestionForTheTimeAtTheNextTick) {
   VehicleLink link({});
   link.receive(frame_from(9, 1, heartbeat_of(2, 12)), kSecond, true);
