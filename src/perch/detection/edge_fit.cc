@@ -51,7 +51,7 @@ struct Sums {
 // One piece about where it is expected, moved by `shift`: the least squares A x = b of the level half way up,
 // the contrast, and -contrast * offset, all along a line.
 struct EdgeFit::Piece {
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero(), inverse = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero(), own = Eigen::Vector3d::Zero();  // x by this piece alone
   double variance = 1;  // of a pixel's grey about the step
   // Of what a narrower blur adds: how much of it there is by this piece alone, its sums.
@@ -84,12 +84,12 @@ bool solve(const Sums& s, EdgeFit::Piece& piece) {
   piece.ww = s.ww;
   piece.off = s.shift / s.lines;
   piece.part = s.part / s.lines;
-  const Eigen::Matrix3d inverse = piece.A.inverse();
-  const Eigen::Vector3d by_narrower = inverse * piece.by_w;
+  piece.inverse = piece.A.inverse();
+  const Eigen::Vector3d by_narrower = piece.inverse * piece.by_w;
   const double iw = cv::v_reduce_sum(s.iw) / kOne;
   const double left = iw - by_narrower.dot(piece.b), own = s.ww - piece.by_w.dot(by_narrower);
   piece.narrower = own > 1e-3 * s.ww ? left / own : 0;
-  piece.own = inverse * piece.b - by_narrower * piece.narrower;
+  piece.own = piece.inverse * piece.b - by_narrower * piece.narrower;
   if (!piece.own.allFinite()) return false;
   // Rounding to whole grey levels is a twelfth at least, however small the residuals of a few.
   const double explained = piece.b.dot(piece.own) + iw * piece.narrower;
@@ -133,7 +133,7 @@ bool fit_lines(const cv::Mat& grey, const CrossingLines& lines, int step, const 
 LevelSurface::Level believed(const EdgeFit::Piece& piece, const LevelSurface::Level& level, double half) {
   constexpr double kDeviations = 4;
   const Eigen::Vector3d u(1, half, 0);
-  const double variance = level.variance + piece.variance * u.dot(piece.A.inverse() * u);
+  const double variance = level.variance + piece.variance * u.dot(piece.inverse * u);
   const double off = u.dot(piece.own) - level.value;
   return off * off > kDeviations * kDeviations * variance ? LevelSurface::Level{} : level;
 }
@@ -206,14 +206,14 @@ void EdgeFit::find_levels(std::span<const EdgePiece> pieces, std::span<const uin
     p.narrower =
         p.own(1) * (1 - std::sqrt(normal.dot(blur_ * normal)) / (std::abs(p.along_normal) * p.blur_px));
     p.b -= p.narrower * p.by_w;
-    p.own = p.A.inverse() * p.b;
+    p.own = p.inverse * p.b;
   }
   const auto gather = [&](double half, bool ground_too) {
     samples_.clear();
     for (const Piece& p : fitted_) {
       if (!ground_too && on_ground[static_cast<size_t>(p.index)]) continue;
       const Eigen::Vector3d u(1, half * p.sign(), 0);
-      const double variance = p.variance * u.dot(p.A.inverse() * u);
+      const double variance = p.variance * u.dot(p.inverse * u);
       samples_.push_back({pieces[static_cast<size_t>(p.index)].middle, u.dot(p.own), variance});
     }
   };
@@ -225,9 +225,13 @@ void EdgeFit::find_levels(std::span<const EdgePiece> pieces, std::span<const uin
 
 // A step that is narrower by a part d than the templates has contrast * d of what a narrower blur adds.
 void EdgeFit::find_blur(std::span<const EdgePiece> pieces, double expected_px) {
+  // Three numbers: as many pieces tell them to a hundredth.
+  constexpr size_t kEnough = 40;
   widths_.clear();
-  for (const Piece& p : fitted_) {
-    const double own = p.ww - p.by_w.dot(p.A.inverse() * p.by_w);
+  const size_t every = std::max<size_t>(1, fitted_.size() / kEnough);
+  for (size_t i = 0; i < fitted_.size(); i += every) {
+    const Piece& p = fitted_[i];
+    const double own = p.ww - p.by_w.dot(p.inverse * p.by_w);
     if (!(own > 0.02 * p.ww)) continue;
     const double cosine = std::abs(p.along_normal), part = std::clamp(p.narrower / p.own(1), -1.0, 0.6);
     const double width = cosine * p.blur_px * (1 - part);
@@ -267,15 +271,17 @@ void EdgeFit::measure(const cv::Mat& grey, std::span<const EdgePiece> pieces,
     if (fit(grey, pieces[i], options, fitted)) fitted_.push_back(fitted);
   }
   find_blur(pieces, options.blur);
-  find_levels(pieces, on_ground);
+  if (options.share_levels) find_levels(pieces, on_ground);
   widen_on_ground(on_ground);
   for (const Piece& p : fitted_) {
     const EdgePiece& piece = pieces[static_cast<size_t>(p.index)];
-    const LevelSurface::Level white = believed(p, white_.at(piece.middle), 0.5 * p.sign());
-    // Of the ground nothing is known.
-    const bool of_ground = on_ground[static_cast<size_t>(p.index)] != 0;
-    const LevelSurface::Level black =
-        of_ground ? LevelSurface::Level{} : believed(p, black_.at(piece.middle), -0.5 * p.sign());
+    LevelSurface::Level white, black;
+    if (options.share_levels) {
+      white = believed(p, white_.at(piece.middle), 0.5 * p.sign());
+      // Of the ground nothing is known.
+      const bool of_ground = on_ground[static_cast<size_t>(p.index)] != 0;
+      if (!of_ground) black = believed(p, black_.at(piece.middle), -0.5 * p.sign());
+    }
     const Step step = solve(p, white, black);
     if (!(std::abs(step.offset) < 0.5) || !std::isfinite(step.sigma)) continue;
     EdgeOffset offset;

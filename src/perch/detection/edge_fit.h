@@ -15,8 +15,9 @@ namespace perch {
 
 struct FitOptions {
   int lines_per_edge = 64;
-  double blur = 0.8;     // of the picture across edges, the pixel's own included, px
-  double contrast = 12;  // of a step, at least; grey levels
+  double blur = 0.8;         // of the picture across edges, the pixel's own included, px
+  double contrast = 12;      // of a step, at least; grey levels
+  bool share_levels = true;  // with a blur that is known only roughly each piece finds its own
 };
 
 // Measures pieces of edges to a few hundredths of a pixel: the lines across a piece, each at its own

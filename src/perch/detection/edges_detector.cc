@@ -239,7 +239,7 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
   PlaneMeasurement plane;
   Eigen::Matrix3d H = found.image_from_plane;
   PlaneFit fit;
-  FitOptions how{(options.lines_per_edge + 3) / 4, found.blur, options.min_contrast};
+  FitOptions how{(options.lines_per_edge + 3) / 4, found.blur, options.min_contrast, false};
   // The first round finds the blur and what is left to a tenth of a pixel, of few lines; the next all of it.
   constexpr int kMostRounds = 3;
   for (int round = 0; round < kMostRounds; ++round) {
@@ -253,7 +253,7 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
     // What a fit to a blurred step makes of one bent by the sensor's response differs by its reach.
     const double bent = 0.1 * fit.growth;
     for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, options.systematic_px, bent);
-    fit = fit_plane(offsets, plane.frame, 0.3, 3);
+    fit = fit_plane(offsets, plane.frame, 0.3, round == 0 ? 2 : 3);
     H = towards_camera(corrected(H, plane.frame, fit.step));
     // What is left of half a tenth of a pixel after one step is nothing.
     if (round > 0 && fit.step.norm() * plane.frame.radius * camera.intrinsics()[0] < 0.15) break;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <vector>
 
 namespace perch {
 
@@ -32,6 +33,7 @@ class LevelSurface {
 
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   double reach_ = 1;
+  std::vector<Coefficients> rows_;  // working memory
   Coefficients x_ = Coefficients::Zero();
   Eigen::Matrix<double, 6, 6> covariance_ = Eigen::Matrix<double, 6, 6>::Zero();
   double variance_ = 1e6;
