@@ -1,0 +1,22 @@
+#include "perch/camera/live_source.h"
+
+#include "perch/camera/paced_source.h"
+#include "perch/config/error.h"
+
+namespace perch {
+
+std::unique_ptr<LiveSource> open_live_source(const std::string& source, const LiveOptions& options,
+                                             Channel channel) {
+  const size_t colon = source.find(':');
+  const std::string kind = source.substr(0, colon);
+  const bool empty = colon == std::string::npos || colon + 1 == source.size();
+  if (!empty && (kind == "flight" || kind == "images" || kind == "video")) {
+    return pace_pictures(open_image_source(source, channel), options.pace);
+  }
+  throw ConfigError(
+      "camera.source: expected v4l2:DEVICE, gst:PIPELINE, flight:FOLDER, images:GLOB or video:FILE, found "
+      "\"" +
+      source + '"');
+}
+
+}  // namespace perch
