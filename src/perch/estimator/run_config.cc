@@ -2,6 +2,31 @@
 
 namespace perch {
 
+namespace {
+
+void read_number(Section& section, std::string_view key, std::optional<double>& value, Range range) {
+  if (!section.has(key)) return;
+  double number = 0;
+  section.read(key, number, range);
+  value = number;
+}
+
+void read_live_options(Section& camera, LiveOptions& live) {
+  camera.read("width", live.width, Range{0, 16384});
+  camera.read("height", live.height, Range{0, 16384});
+  if ((live.width == 0) != (live.height == 0)) {
+    camera.fail(live.width == 0 ? "height" : "width", "both width and height, or neither");
+  }
+  camera.read("rate", live.rate_hz, Range{0, 1000});
+  camera.read("format", live.format);
+  read_number(camera, "exposure", live.exposure, Range{1e-6, 1});  // above: ms, not s
+  read_number(camera, "gain", live.gain, kNotNegative);
+  camera.read("latency", live.latency, Range{-1, 10});
+  camera.read_choice("pace", live.pace, {{"real_time", Pace::kRealTime}, {"fast", Pace::kFast}});
+}
+
+}  // namespace
+
 RunConfig read_run_config(Section root) {
   RunConfig config;
   if (!root.has("target")) root.fail("target", "the path of a target file");
@@ -10,13 +35,14 @@ RunConfig read_run_config(Section root) {
   config.target = read_target(target);
 
   Section camera = root.section("camera");
-  camera.read("source", config.source);
+  camera.read_source("source", config.source, {"video", "images", "flight", "sim"});
   if (camera.has("model")) camera.read("model", config.camera_model);
   camera.read_choice("channel", config.channel,
                      {{"grey", Channel::kGrey},
                       {"red", Channel::kRed},
                       {"green", Channel::kGreen},
                       {"blue", Channel::kBlue}});
+  read_live_options(camera, config.live);
   camera.done();
 
   config.frames = read_frame_chain(root.section("frames"));

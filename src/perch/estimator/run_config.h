@@ -4,6 +4,7 @@
 #include <string>
 
 #include "perch/camera/image_source.h"
+#include "perch/camera/live_source.h"
 #include "perch/config/section.h"
 #include "perch/detection/make_detector.h"
 #include "perch/frames/frame_chain.h"
@@ -19,6 +20,7 @@ struct RunConfig {
   std::string source;                  // camera.source; empty: the program's own argument says
   std::filesystem::path camera_model;  // camera.model; empty: the flight's own
   Channel channel = Channel::kGrey;
+  LiveOptions live;  // the rest of `camera`: what a live source is to do
   FrameChain frames;
   DetectionOptions detection;
   PoseOptions pose;
