@@ -1,5 +1,7 @@
 #include "perch/camera/live_source.h"
 
+#include "perch/camera/gst_device.h"
+#include "perch/camera/live_camera.h"
 #include "perch/camera/paced_source.h"
 #include "perch/config/error.h"
 
@@ -9,9 +11,12 @@ std::unique_ptr<LiveSource> open_live_source(const std::string& source, const Li
                                              Channel channel) {
   const size_t colon = source.find(':');
   const std::string kind = source.substr(0, colon);
-  const bool empty = colon == std::string::npos || colon + 1 == source.size();
-  if (!empty && (kind == "flight" || kind == "images" || kind == "video")) {
-    return pace_pictures(open_image_source(source, channel), options.pace);
+  const std::string what = colon == std::string::npos ? "" : source.substr(colon + 1);
+  if (!what.empty()) {
+    if (kind == "gst") return make_live_camera(make_gst_device(what, options, channel), options);
+    if (kind == "flight" || kind == "images" || kind == "video") {
+      return pace_pictures(open_image_source(source, channel), options.pace);
+    }
   }
   throw ConfigError(
       "camera.source: expected v4l2:DEVICE, gst:PIPELINE, flight:FOLDER, images:GLOB or video:FILE, found "

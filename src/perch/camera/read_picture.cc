@@ -46,7 +46,7 @@ cv::Mat to_grey(const cv::Mat& picture, Channel channel) {
   } else if (channel == Channel::kGrey) {
     cv::cvtColor(picture, grey, picture.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
   } else {
-    cv::extractChannel(picture, grey, channel == Channel::kBlue ? 0 : channel == Channel::kGreen ? 1 : 2);
+    cv::extractChannel(picture, grey, bgr_index(channel));
   }
   if (grey.depth() == CV_16U) return eight_bits(grey);
   return grey.isContinuous() ? grey : grey.clone();

@@ -10,4 +10,9 @@ namespace perch {
 // has it: 0.299 R + 0.587 G + 0.114 B. May share its memory with `picture`.
 cv::Mat to_grey(const cv::Mat& picture, Channel channel);
 
+// Where a channel is in BGR order.
+inline int bgr_index(Channel channel) {
+  return channel == Channel::kBlue ? 0 : channel == Channel::kGreen ? 1 : 2;
+}
+
 }  // namespace perch
