@@ -47,9 +47,11 @@ double SimulatedFlight::time(int64_t frame) const {
   return static_cast<double>(frame_ns(frame, simulation_.rate_hz)) * 1e-9;
 }
 
-VehicleTruth SimulatedFlight::vehicle(int64_t frame) const { return descent_.at(time(frame)); }
+VehicleTruth SimulatedFlight::vehicle(int64_t frame) const { return vehicle_at(time(frame)); }
+VehicleTruth SimulatedFlight::vehicle_at(double time) const { return descent_.at(time); }
 
-PadTruth SimulatedFlight::pad(int64_t frame) const { return deck_.at(time(frame)); }
+PadTruth SimulatedFlight::pad(int64_t frame) const { return pad_at(time(frame)); }
+PadTruth SimulatedFlight::pad_at(double time) const { return deck_.at(time); }
 
 Rigid3 SimulatedFlight::pad_from_body(int64_t frame) const {
   return inverse(pad(frame).world_from_pad) * vehicle(frame).world_from_body;

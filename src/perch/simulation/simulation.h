@@ -48,6 +48,8 @@ class SimulatedFlight {
   int64_t timestamp_ns(int64_t frame) const;  // mid-exposure, camera clock
   VehicleTruth vehicle(int64_t frame) const;  // then
   PadTruth pad(int64_t frame) const;
+  VehicleTruth vehicle_at(double time) const;  // at any time in s since the start, that of frame 0
+  PadTruth pad_at(double time) const;
   Rigid3 pad_from_body(int64_t frame) const;
   Eigen::Vector3d body_velocity_in_pad(int64_t frame) const;  // as seen from the pad, m/s
   Rigid3 camera_from_target(int64_t frame) const;
