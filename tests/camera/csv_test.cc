@@ -120,5 +120,28 @@ TEST(ClockOrder, KeepsAnIncreasingSequenceOfAnyTimes) {
   }
 }
 
+TEST(CsvReader, WithoutItsEndTheLastLineIsARowOrCutOff) {
+  const TempFolder folder;
+  const std::string whole = "#timestamp [ns],x\n1,25\n2,37\n";
+  const auto rows = [&](const std::string& text, LastLine last_line, std::vector<std::string>& problems) {
+    CsvReader csv(folder.write("a.csv", text), last_line);
+    std::vector<std::string> found;
+    while (csv.next()) found.emplace_back(csv.fields().back());
+    csv.note_torn(problems);
+    return found;
+  };
+  std::vector<std::string> problems;
+  EXPECT_THAT(rows(whole.substr(0, whole.size() - 2), LastLine::kMayLackEnd, problems),
+              testing::ElementsAre("25", "3"));
+  EXPECT_THAT(rows(whole, LastLine::kMustEnd, problems), testing::ElementsAre("25", "37"));
+  EXPECT_THAT(rows("", LastLine::kMustEnd, problems), testing::IsEmpty());
+  EXPECT_THAT(problems, testing::IsEmpty());
+  EXPECT_THAT(rows(whole.substr(0, whole.size() - 2), LastLine::kMustEnd, problems),
+              testing::ElementsAre("25"));
+  EXPECT_THAT(problems, testing::ElementsAre((folder / "a.csv").string() +
+                                             ":3: the file was cut off within this row, row skipped"));
+  EXPECT_THAT(rows("#timestam", LastLine::kMustEnd, problems), testing::IsEmpty());
+}
+
 }  // namespace
 }  // namespace perch

@@ -24,6 +24,7 @@ class TestRng {
     engine_.seed(hash);
   }
 
+  uint64_t bits() { return engine_(); }
   double uniform(double low, double high) {
     // 53 bits of the engine: std::uniform_real_distribution is not the same everywhere.
     return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;

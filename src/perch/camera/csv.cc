@@ -67,12 +67,16 @@ std::string quoted(std::string_view field) {
   return text + (field.size() > kShown ? "...\"" : "\"");
 }
 
-CsvReader::CsvReader(const fs::path& file) : file_(file) {
+CsvReader::CsvReader(const fs::path& file, LastLine last_line) : file_(file) {
   std::ifstream stream(file, std::ios::binary);
   std::error_code ignored;
   if (!stream || fs::is_directory(file, ignored))
     throw std::runtime_error(file.string() + ": cannot be read");
   text_.assign(std::istreambuf_iterator<char>(stream), {});
+  if (last_line == LastLine::kMustEnd && !text_.empty() && text_.back() != '\n') {
+    text_.resize(text_.rfind('\n') + 1);  // npos + 1 is 0
+    torn_line_ = static_cast<int>(std::count(text_.begin(), text_.end(), '\n')) + 1;
+  }
   if (text_.starts_with("\xEF\xBB\xBF")) position_ = 3;
 
   std::string_view line;
@@ -124,6 +128,12 @@ bool CsvReader::next() {
 }
 
 std::string CsvReader::place() const { return file_.string() + ":" + std::to_string(line_); }
+
+void CsvReader::note_torn(std::vector<std::string>& problems) const {
+  if (!torn_line_) return;
+  problems.push_back(file_.string() + ":" + std::to_string(*torn_line_) +
+                     ": the file was cut off within this row, row skipped");
+}
 
 bool CsvReader::has_column(ColumnName name) const {
   return std::any_of(header_.begin(), header_.end(), [&](std::string_view column) {

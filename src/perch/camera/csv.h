@@ -23,13 +23,17 @@ std::string quoted(std::string_view field);
 // A column that a table must have, as docs/FORMATS.md writes it: "p_x [m]".
 using ColumnName = std::string_view;
 
+// What a last line without a line end is. A program that was ended while it appended rows (kMustEnd) may have
+// left half of one, and half a number is a number, too.
+enum class LastLine { kMayLackEnd, kMustEnd };
+
 // Reads a file of comma separated values row by row. Files come from loggers, spreadsheets and editors: a
 // byte order mark, CR LF, blank lines, comments (#), spaces around a field and a missing last newline are all
 // taken. The header is the line, comment or not, before the first row whose first field begins with "time".
 class CsvReader {
  public:
   // Throws std::runtime_error naming a file that cannot be read.
-  explicit CsvReader(const std::filesystem::path& file);
+  explicit CsvReader(const std::filesystem::path& file, LastLine last_line = LastLine::kMayLackEnd);
 
   // False at the end. Afterwards fields() are the trimmed fields of the row, valid until the next call.
   bool next();
@@ -43,6 +47,9 @@ class CsvReader {
   std::vector<size_t> columns(std::span<const ColumnName> names) const;
   bool has_column(ColumnName name) const;
 
+  // Notes the last line that was skipped because it has no end, if there was one.
+  void note_torn(std::vector<std::string>& problems) const;
+
  private:
   bool next_line(std::string_view& line);
   void split(std::string_view line, std::vector<std::string_view>& fields) const;
@@ -52,6 +59,7 @@ class CsvReader {
   size_t position_ = 0;
   int line_ = 0;
   int header_line_ = 0;
+  std::optional<int> torn_line_;
   std::vector<std::string_view> header_;  // empty: there is none
   std::vector<std::string_view> fields_;
   bool first_is_pending_ = false;  // the first row, read while looking for the header

@@ -74,8 +74,9 @@ class FlightVideoSource : public PictureSource {
   VideoReader video_;
 };
 
-std::vector<Picture> read_rows(const fs::path& cam0, bool video, std::vector<std::string>& problems) {
-  CsvReader csv(cam0 / "data.csv");
+std::vector<Picture> read_rows(const fs::path& cam0, bool video, LastLine last_line,
+                               std::vector<std::string>& problems) {
+  CsvReader csv(cam0 / "data.csv", last_line);
   csv.columns(std::array<ColumnName, 1>{"timestamp [ns]"});  // refuses times in other units
   std::vector<Picture> pictures;
   std::vector<std::string> places;
@@ -92,6 +93,7 @@ std::vector<Picture> read_rows(const fs::path& cam0, bool video, std::vector<std
       places.push_back(csv.place());
     }
   }
+  csv.note_torn(problems);
   if (pictures.empty() && problems.empty()) problems.push_back((cam0 / "data.csv").string() + ": no rows");
   return in_time_order(std::move(pictures), places, problems);
 }
@@ -150,7 +152,9 @@ std::unique_ptr<ImageSource> open_flight_pictures(const fs::path& folder, Channe
   const fs::path video = cam0 / "data.mkv";
   const bool has_video = !fs::is_directory(cam0 / "data", ignored) && fs::exists(video, ignored);
   std::vector<std::string> problems;
-  std::vector<Picture> pictures = read_rows(cam0, has_video, problems);
+  // A live run appends its rows as it goes.
+  const LastLine last_line = fs::exists(folder / "run", ignored) ? LastLine::kMustEnd : LastLine::kMayLackEnd;
+  std::vector<Picture> pictures = read_rows(cam0, has_video, last_line, problems);
   if (has_video) {
     return std::make_unique<FlightVideoSource>(video, std::move(pictures), std::move(problems), channel);
   }

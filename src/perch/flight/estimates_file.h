@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "perch/camera/csv.h"
 #include "perch/estimator/estimate.h"
 
 namespace perch {
@@ -29,8 +30,11 @@ void write_pad_from_body(const std::filesystem::path& file,
 
 // What a row holds; the rest of an Estimate keeps its defaults. Rows that cannot be read are skipped and
 // noted with file and line; std::runtime_error when there is no such file or its columns are others.
-std::vector<Estimate> read_estimates(const std::filesystem::path& file, std::vector<std::string>& problems);
+// A live run's, which ends anywhere: with LastLine::kMustEnd.
+std::vector<Estimate> read_estimates(const std::filesystem::path& file, std::vector<std::string>& problems,
+                                     LastLine last_line = LastLine::kMayLackEnd);
 // The covariance has the file's standard deviations on its diagonal and zeros beside it.
-std::vector<VehicleState> read_states(const std::filesystem::path& file, std::vector<std::string>& problems);
+std::vector<VehicleState> read_states(const std::filesystem::path& file, std::vector<std::string>& problems,
+                                      LastLine last_line = LastLine::kMayLackEnd);
 
 }  // namespace perch

@@ -78,8 +78,10 @@ Flight read_flight(const fs::path& folder) {
   read_camera(mav0 / "cam0", flight);
 
   const fs::path nav0 = mav0 / "nav0" / "data.csv", truth = mav0 / "state_groundtruth_estimate0" / "data.csv";
+  // A live run appends its rows as it goes.
+  const LastLine last_line = is_there(folder / "run") ? LastLine::kMustEnd : LastLine::kMayLackEnd;
   const bool has_nav = is_there(nav0), has_truth = is_there(truth);
-  if (has_nav) attempt(flight.problems, [&] { flight.nav = read_nav(nav0, flight.problems); });
+  if (has_nav) attempt(flight.problems, [&] { flight.nav = read_nav(nav0, flight.problems, last_line); });
   if (has_truth) {
     attempt(flight.problems,
             [&] { (has_nav ? flight.truth : flight.nav) = read_nav(truth, flight.problems); });
@@ -87,7 +89,7 @@ Flight read_flight(const fs::path& folder) {
   flight.nav_is_truth = has_truth && !has_nav;
   const fs::path gimbal = mav0 / "gimbal0" / "data.csv";
   if (is_there(gimbal))
-    attempt(flight.problems, [&] { flight.gimbal = read_gimbal(gimbal, flight.problems); });
+    attempt(flight.problems, [&] { flight.gimbal = read_gimbal(gimbal, flight.problems, last_line); });
   return flight;
 }
 

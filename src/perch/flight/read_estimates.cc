@@ -54,8 +54,8 @@ class Row {
 
 template <typename Result, typename ReadRow>
 std::vector<Result> read_table(const std::filesystem::path& file, const std::vector<std::string>& names,
-                               std::vector<std::string>& problems, ReadRow read_row) {
-  CsvReader csv(file);
+                               std::vector<std::string>& problems, LastLine last_line, ReadRow read_row) {
+  CsvReader csv(file, last_line);
   const std::vector<size_t> columns = csv.columns(std::vector<ColumnName>(names.begin(), names.end()));
   std::vector<Result> results;
   while (csv.next()) {
@@ -66,6 +66,7 @@ std::vector<Result> read_table(const std::filesystem::path& file, const std::vec
       problems.push_back(csv.place() + ": " + e.what());
     }
   }
+  csv.note_torn(problems);
   return results;
 }
 
@@ -107,12 +108,14 @@ VehicleState read_state(Row& row) {
 
 }  // namespace
 
-std::vector<Estimate> read_estimates(const std::filesystem::path& file, std::vector<std::string>& problems) {
-  return read_table<Estimate>(file, estimate_columns(), problems, read_estimate);
+std::vector<Estimate> read_estimates(const std::filesystem::path& file, std::vector<std::string>& problems,
+                                     LastLine last_line) {
+  return read_table<Estimate>(file, estimate_columns(), problems, last_line, read_estimate);
 }
 
-std::vector<VehicleState> read_states(const std::filesystem::path& file, std::vector<std::string>& problems) {
-  return read_table<VehicleState>(file, state_columns(), problems, read_state);
+std::vector<VehicleState> read_states(const std::filesystem::path& file, std::vector<std::string>& problems,
+                                      LastLine last_line) {
+  return read_table<VehicleState>(file, state_columns(), problems, last_line, read_state);
 }
 
 }  // namespace perch

@@ -71,8 +71,8 @@ size_t fill_velocities(std::vector<NavSample>& samples) {
 
 }  // namespace
 
-NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& problems) {
-  CsvReader csv(file);
+NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& problems, LastLine last_line) {
+  CsvReader csv(file, last_line);
   const bool euroc = csv.has_column(kEurocColumns[1]);
   std::span<const ColumnName> names = euroc ? kEurocColumns : kNavColumns;
   const bool has_header = csv.has_column(names[1]);
@@ -102,6 +102,7 @@ NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& p
     samples.push_back(sample);
     places.push_back(csv.place());
   }
+  csv.note_torn(problems);
   NavTrack track{in_time_order(std::move(samples), places, problems)};
   if (const size_t filled = fill_velocities(track.samples)) {
     problems.push_back(file.string() + ": " + std::to_string(filled) +
@@ -110,8 +111,9 @@ NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& p
   return track;
 }
 
-std::vector<GimbalSample> read_gimbal(const std::filesystem::path& file, std::vector<std::string>& problems) {
-  CsvReader csv(file);
+std::vector<GimbalSample> read_gimbal(const std::filesystem::path& file, std::vector<std::string>& problems,
+                                      LastLine last_line) {
+  CsvReader csv(file, last_line);
   const std::vector<size_t> columns = csv.columns(kGimbalColumns);
   std::vector<GimbalSample> samples;
   std::vector<std::string> places;
@@ -128,6 +130,7 @@ std::vector<GimbalSample> read_gimbal(const std::filesystem::path& file, std::ve
     samples.push_back(sample);
     places.push_back(csv.place());
   }
+  csv.note_torn(problems);
   return in_time_order(std::move(samples), places, problems);
 }
 

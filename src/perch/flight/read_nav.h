@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "perch/camera/csv.h"
 #include "perch/flight/flight.h"
 
 namespace perch {
@@ -13,8 +14,10 @@ namespace perch {
 
 // nav0/data.csv or EuRoC's state_groundtruth_estimate0/data.csv, told apart by the header. Quaternions of any
 // length but 0 are normalised; where velocities are missing they are taken from the positions.
-NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& problems);
+NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& problems,
+                  LastLine last_line = LastLine::kMayLackEnd);
 
-std::vector<GimbalSample> read_gimbal(const std::filesystem::path& file, std::vector<std::string>& problems);
+std::vector<GimbalSample> read_gimbal(const std::filesystem::path& file, std::vector<std::string>& problems,
+                                      LastLine last_line = LastLine::kMayLackEnd);
 
 }  // namespace perch

@@ -1,9 +1,9 @@
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
 
 #include "perch/config/atomic_file.h"
+#include "perch/flight/csv_number.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/estimates_names.h"
 
@@ -15,18 +15,6 @@ std::string joined(const std::vector<std::string>& columns) {
   std::string line;
   for (const std::string& column : columns) line += (line.empty() ? "" : ",") + column;
   return line + "\n";
-}
-
-template <typename... Format>
-void append_number(std::string& text, auto value, Format... format) {
-  char buffer[512];  // 1e308 in fixed format has 309 digits
-  const auto [end, error] = std::to_chars(buffer, buffer + sizeof(buffer), value, format...);
-  text.append(buffer, end);
-}
-
-void append_field(std::string& csv, double value) {
-  csv += ',';
-  append_number(csv, value);
 }
 
 void append_microseconds(std::string& csv, double value) {

@@ -7,6 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "perch/flight/sensor_file.h"
+
 namespace perch {
 
 namespace fs = std::filesystem;
@@ -38,13 +40,6 @@ bool is_ours(const fs::path& folder) {
   return std::getline(stream, line) && line == kMark;
 }
 
-// 17 digits: what is read back is what was, to the last bit.
-std::string numbers(const std::vector<double>& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + format("%.17g", value);
-  return text;
-}
-
 std::string point_and_quaternion(const Rigid3& pose) {
   const Eigen::Vector3d& p = pose.translation;
   const Eigen::Quaterniond q = positive_w(pose.rotation);
@@ -53,41 +48,11 @@ std::string point_and_quaternion(const Rigid3& pose) {
 
 std::string velocity(const Eigen::Vector3d& v) { return format("%.17g,%.17g,%.17g", v.x(), v.y(), v.z()); }
 
-std::string sensor_yaml(const Simulation& simulation) {
-  const CameraModel& camera = simulation.camera;
-  const auto& k = camera.intrinsics();
-  const Eigen::Matrix3d R = simulation.body_from_camera.rotation.toRotationMatrix();
-  const Eigen::Vector3d& p = simulation.body_from_camera.translation;
-  std::string text =
-      "# Simulated camera. Integer pixel coordinates are pixel centres.\nsensor_type: camera\n"
-      "# T_BS takes camera coordinates (x right, y down, z forward) to the body (FRD).\n"
-      "T_BS:\n  cols: 4\n  rows: 4\n  data: [";
-  for (int i = 0; i < 3; ++i) text += numbers({R(i, 0), R(i, 1), R(i, 2), p[i]}) + ",\n         ";
-  text += "0, 0, 0, 1]\n" + format("rate_hz: %.17g\n", simulation.rate_hz);
-  text += format("resolution: [%d, %d]\ncamera_model: pinhole\n", camera.width(), camera.height());
-  if (k.size() >= 4) text += "intrinsics: [" + numbers({k[0], k[1], k[2], k[3]}) + "]\n";
-  if (camera.lens() == "LENSMODEL_PINHOLE") {
-    text += "distortion_model: radial-tangential\ndistortion_coefficients: [0, 0, 0, 0]\n";
-  } else if (camera.lens() == "LENSMODEL_OPENCV4") {
-    text += "distortion_model: radial-tangential\ndistortion_coefficients: [" +
-            numbers({k.begin() + 4, k.end()}) + "]\n";
-  } else {
-    text += "# The lens is none that this file can describe: see camera.cameramodel.\n";
-  }
-  return text;
-}
-
-std::string camera_model(const CameraModel& camera) {
-  return "{\n    'lensmodel':  '" + camera.lens() + "',\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n" +
-         "    'intrinsics': [ " + numbers(camera.intrinsics()) + " ],\n" +
-         format("    'imagersize': [ %d, %d ]\n}\n", camera.width(), camera.height());
-}
-
 std::string pose_yaml(const Rigid3& pose) {
   const Eigen::Vector3d& p = pose.translation;
   const Eigen::Quaterniond q = positive_w(pose.rotation);
-  return "{position: [" + numbers({p.x(), p.y(), p.z()}) + "], rotation: {quaternion_wxyz: [" +
-         numbers({q.w(), q.x(), q.y(), q.z()}) + "]}}";
+  return "{position: [" + list_of_numbers({p.x(), p.y(), p.z()}) + "], rotation: {quaternion_wxyz: [" +
+         list_of_numbers({q.w(), q.x(), q.y(), q.z()}) + "]}}";
 }
 
 // What perch-batch needs to score this flight: everything as it really was.
@@ -188,9 +153,11 @@ void FlightFolder::write_tables(const SimulatedFlight& flight,
   write(mav / "state_groundtruth_estimate0" / "data.csv", states);
   write(mav / "nav0" / "data.csv", nav);
   write_motions(flight);
-  write(mav / "cam0" / "sensor.yaml", sensor_yaml(simulation));
-  if (simulation.camera.lens() != "LENSMODEL_PINHOLE" && simulation.camera.lens() != "LENSMODEL_OPENCV4") {
-    write(mav / "cam0" / "camera.cameramodel", camera_model(simulation.camera));
+  write(mav / "cam0" / "sensor.yaml",
+        sensor_yaml({simulation.camera, simulation.body_from_camera, simulation.rate_hz,
+                     "# Simulated camera. Integer pixel coordinates are pixel centres.\n"}));
+  if (!sensor_yaml_has_lens(simulation.camera)) {
+    write(mav / "cam0" / "camera.cameramodel", camera_model_text(simulation.camera));
   }
   fs::copy_file(simulation.target_file, part_ / "target.yaml", fs::copy_options::overwrite_existing);
   write(part_ / "perch.yaml", perch_yaml(simulation));

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace perch {
+
+// Makes the calling thread give way to those that estimate, where a core is short. On Linux a niceness is a
+// thread's own.
+inline void work_in_background() { setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10); }
+
+}  // namespace perch
