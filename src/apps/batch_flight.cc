@@ -11,6 +11,7 @@
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/flight.h"
 #include "perch/flight/head_angles.h"
+#include "perch/flight/recorded_aids.h"
 
 namespace perch {
 namespace {
@@ -38,15 +39,6 @@ FrameChain chain_of(const RunConfig& config, const Flight& flight) {
   return chain;
 }
 
-Estimator::Aid aid_at(const Flight& flight, const FrameChain& chain, int64_t camera_time_ns) {
-  Estimator::Aid aid;
-  if (const auto nav = flight.nav.at(navigation_time_ns(chain, camera_time_ns))) {
-    aid.world_from_body = nav->world_from_body.rotation;
-  }
-  aid.angles = head_angles_at(flight.gimbal, camera_time_ns);
-  return aid;
-}
-
 // What the flight's navigation said up to a frame, as it would have come in a live run.
 class RecordedAutopilot {
  public:
@@ -72,11 +64,47 @@ class RecordedAutopilot {
   size_t next_ = 0;
 };
 
+// What the estimator is given beside each picture, frame by frame in their order: what a live run's was given
+// where the flight is one of a live run, else what its navigation and gimbal say.
+class Aids {
+ public:
+  Aids(const RunConfig& config, const Flight& flight, const FrameChain& chain)
+      : flight_(flight),
+        chain_(chain),
+        autopilot_(flight.nav, chain),
+        fuse_navigation_(config.tracking.fuse_navigation) {
+    if (config.replay_aids == ReplayAids::kRecorded && RecordedAids::are_there(flight.folder)) {
+      recorded_.emplace(flight.folder);
+    }
+  }
+
+  Estimator::Aid at(int64_t camera_time_ns) {
+    if (recorded_) return recorded_->at(camera_time_ns);
+    Estimator::Aid aid;
+    if (const auto nav = flight_.nav.at(navigation_time_ns(chain_, camera_time_ns))) {
+      aid.world_from_body = nav->world_from_body.rotation;
+    }
+    aid.angles = head_angles_at(flight_.gimbal, camera_time_ns);
+    if (fuse_navigation_) aid.autopilot = autopilot_.until(camera_time_ns);
+    return aid;
+  }
+  std::vector<std::string> problems() const {
+    return recorded_ ? recorded_->problems() : std::vector<std::string>{};
+  }
+
+ private:
+  const Flight& flight_;
+  const FrameChain& chain_;
+  RecordedAutopilot autopilot_;
+  bool fuse_navigation_;
+  std::optional<RecordedAids> recorded_;
+};
+
 // Decodes in parallel and estimates in order: a frame's result may depend on those before it.
 void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator,
                      FlightResult& result) {
   using FramePtr = std::shared_ptr<Frame>;
-  RecordedAutopilot autopilot(result.flight.nav, result.chain);
+  Aids aids(job.config, result.flight, result.chain);
   tbb::parallel_pipeline(
       kFramesAhead,
       tbb::make_filter<void, FramePtr>(tbb::filter_mode::serial_in_order,
@@ -92,13 +120,12 @@ void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& est
                                                  return frame;
                                                }) &
           tbb::make_filter<FramePtr, void>(tbb::filter_mode::serial_in_order, [&](const FramePtr& frame) {
-            auto aid = aid_at(result.flight, result.chain, frame->timestamp_ns);
-            if (job.config.tracking.fuse_navigation) aid.autopilot = autopilot.until(frame->timestamp_ns);
-            result.estimates.push_back(estimator.process(*frame, aid));
+            result.estimates.push_back(estimator.process(*frame, aids.at(frame->timestamp_ns)));
             result.frame_names.push_back(frame->name);
             job.frame_done();
           }));
   if (job.stop) throw Interrupted();
+  result.problems = aids.problems();
 }
 
 void write_outputs(const fs::path& folder, const FlightResult& result, const FlightScore& score) {
@@ -144,7 +171,7 @@ ReportFlight run_flight(const BatchFlight& job) {
   Estimator estimator(config, camera);
   const auto source = open_image_source("flight:" + job.folder.string(), job.config.channel);
   estimate_frames(job, *source, estimator, result);
-  result.problems = source->problems();
+  result.problems.insert(result.problems.end(), source->problems().begin(), source->problems().end());
 
   ReportFlight report{score_flight(result), {}};
   write_outputs(job.output, result, report.score);

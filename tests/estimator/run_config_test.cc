@@ -31,6 +31,7 @@ TEST(RunConfig, NeedsNothingButATarget) {
   EXPECT_EQ(config.live.pace, Pace::kRealTime);
   EXPECT_EQ(config.detection.paper.threshold_fraction, 0.65);
   EXPECT_FALSE(config.frames.body_from_base);
+  EXPECT_EQ(config.replay_aids, ReplayAids::kRecorded);
 }
 
 TEST(RunConfig, ReadsEveryPartOfTheFile) {
@@ -42,6 +43,7 @@ frames: {body_from_base: identity}
 detection: {method: paper, paper: {threshold_fraction: 0.5, min_component_px: 7}}
 pose: {max_rms_sigmas: 2}
 tracking: {coast: 3, history: 0.2, fuse_navigation: true}
+replay: {aids: navigation}
 nav: mavlink+serial:/dev/ttyAMA0:921600
 outputs: {station: {listen: "127.0.0.1:8080"}}
 )");
@@ -63,6 +65,7 @@ outputs: {station: {listen: "127.0.0.1:8080"}}
   EXPECT_EQ(config.tracking.coast, 3);
   EXPECT_EQ(config.tracking.history, 0.2);
   EXPECT_TRUE(config.tracking.fuse_navigation);
+  EXPECT_EQ(config.replay_aids, ReplayAids::kNavigation);
 }
 
 TEST(RunConfig, NamesTheLineAndTheKeyOfWhatIsWrong) {

@@ -49,6 +49,10 @@ RunConfig read_run_config(Section root) {
   config.detection = read_detection_options(root.section("detection"));
   config.pose = read_pose_options(root.section("pose"));
   config.tracking = read_tracking_options(root.section("tracking"));
+  Section replay = root.section("replay");
+  replay.read_choice("aids", config.replay_aids,
+                     {{"recorded", ReplayAids::kRecorded}, {"navigation", ReplayAids::kNavigation}});
+  replay.done();
   // The live program's: a batch run reads the same file and leaves them alone.
   std::string nav = "flight";
   root.read("nav", nav);

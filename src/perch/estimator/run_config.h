@@ -14,6 +14,12 @@
 
 namespace perch {
 
+// What the estimator is given beside the pictures of a recorded flight.
+enum class ReplayAids {
+  kRecorded,    // of a live run's flight: what the live run's was given; of any other as below
+  kNavigation,  // what the flight's navigation and gimbal say
+};
+
 // The one YAML file of a run, live or batch (docs/FORMATS.md, Configuration).
 struct RunConfig {
   LandingTarget target;
@@ -25,6 +31,7 @@ struct RunConfig {
   DetectionOptions detection;
   PoseOptions pose;
   TrackingOptions tracking;
+  ReplayAids replay_aids = ReplayAids::kRecorded;
 };
 
 // Reads the whole document. Throws ConfigError for anything that is not as it should be; nothing starts then.
