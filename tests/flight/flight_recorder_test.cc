@@ -230,6 +230,54 @@ TEST_F(Recording, WithoutMountOrNavigationHasNone) {
   EXPECT_THAT(recorded.flight.gimbal, IsEmpty());
 }
 
+TEST_F(Recording, AsAVideoReadsBackAlike) {
+  options.format = "ffv1";
+  auto r = recorder();
+  std::vector<Frame> frames;
+  for (int i = 0; i < 20; ++i) {
+    frames.push_back(frame(i));
+    ASSERT_TRUE(r->add_frame(frames.back(), aid(i), estimate(i)));
+  }
+  Frame broken = frame(20);
+  broken.grey.release();
+  r->add_frame(broken, aid(20), estimate(20));
+  r->close();
+  EXPECT_EQ(r->counters().frames_written, 20);
+  EXPECT_EQ(r->counters().last_problem, "a picture that the video cannot hold");
+  const Recorded recorded(r->folder());
+  EXPECT_THAT(recorded.problems, IsEmpty());
+  ASSERT_EQ(recorded.frames.size(), 20u);
+  for (size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(recorded.frames[i].timestamp_ns, frames[i].timestamp_ns);
+    EXPECT_EQ(cv::norm(recorded.frames[i].grey, frames[i].grey, cv::NORM_L1), 0);
+  }
+}
+
+TEST_F(Recording, OfAVideoOnAFullDiskKeepsFramesAndRowsTogether) {
+  options.format = "ffv1";
+  auto r = recorder();
+  std::vector<Frame> frames;
+  for (int i = 0; i < 30; ++i) {
+    frames.push_back(frame(i));
+    // Refuses now and then, at whatever the thread writes just then.
+    disk_->full = i % 3 == 1;
+    r->add_frame(frames.back(), aid(i), estimate(i));
+    std::this_thread::sleep_for(std::chrono::microseconds(rng.bits() % 1000));
+  }
+  disk_->full = false;
+  frames.push_back(frame(30));
+  r->add_frame(frames.back(), aid(30), estimate(30));
+  r->close();
+  EXPECT_GT(r->counters().frames_dropped, 0);
+  const Recorded recorded(r->folder());
+  EXPECT_THAT(recorded.problems, IsEmpty());
+  EXPECT_EQ(recorded.frames.size(), static_cast<size_t>(r->counters().frames_written));
+  for (const Frame& f : recorded.frames) {
+    const auto i = static_cast<size_t>((f.timestamp_ns - kStartNs) / kPeriodNs);
+    EXPECT_EQ(cv::norm(f.grey, frames[i].grey, cv::NORM_L1), 0) << i;
+  }
+}
+
 TEST_F(Recording, ThatCannotBeginSaysWhy) {
   options.folder = folder_.write("file", "");
   EXPECT_THROW(recorder(), std::runtime_error);
@@ -237,6 +285,9 @@ TEST_F(Recording, ThatCannotBeginSaysWhy) {
   disk_->full = true;
   EXPECT_THROW(recorder(), std::runtime_error);
   disk_->full = false;
+  options.format = "gif";
+  EXPECT_THROW(recorder(), std::invalid_argument);
+  options.format = "ffv1";
   options.queue_frames = 0;
   EXPECT_THROW(recorder(), std::invalid_argument);
 }
@@ -394,6 +445,7 @@ TEST_F(Recording, KilledAtAnyMomentItLosesASecondAtMost) {
       mmap(nullptr, kAtATime * sizeof(Progress), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
   ASSERT_NE(progress, MAP_FAILED);
   for (int round = 0; round < kRounds; ++round) {
+    options.format = round % 2 == 0 ? "png" : "ffv1";
     std::vector<pid_t> children;
     std::vector<fs::path> folders;
     for (int c = 0; c < kAtATime; ++c) {

@@ -107,11 +107,15 @@ FlightRecorder::FlightRecorder(const RecorderOptions& options, const CameraModel
                                const std::optional<Rigid3>& body_from_camera, double rate_hz)
     : options_(options) {
   if (options.queue_frames < 1) throw std::invalid_argument("queue_frames: expected 1 or more");
+  if (options.format != "png" && options.format != "ffv1") {
+    throw std::invalid_argument("format: expected png or ffv1, found " + options.format);
+  }
+  if (!(rate_hz > 0 && rate_hz < 1e4)) throw std::invalid_argument("rate: expected one above 0");
   if (!options.disk) throw std::invalid_argument("disk: expected one");
   folder_ = make_flight_folder(options.folder);
   RecordingDisk& disk = *options_.disk;
   const fs::path mav0 = folder_ / "mav0", cam0 = mav0 / "cam0";
-  for (const fs::path& folder : {cam0 / "data", mav0 / "nav0", mav0 / "gimbal0", folder_ / "run"}) {
+  for (const fs::path& folder : {cam0, mav0 / "nav0", mav0 / "gimbal0", folder_ / "run"}) {
     fs::create_directories(folder);
   }
   write_text(disk, cam0 / "camera.cameramodel", camera_model_text(camera));
@@ -121,11 +125,13 @@ FlightRecorder::FlightRecorder(const RecorderOptions& options, const CameraModel
   logs_ = std::make_unique<Logs>(disk, folder_);
   disk_left_ = disk.bytes_left(folder_);
   PictureRecorder::Options pictures;
-  pictures.cam0 = cam0;
   pictures.slots = options.queue_frames;
+  pictures.size = {camera.width(), camera.height()};
   pictures.may_write = [this] { return disk_left_ >= options_.least_free_disk; };
   pictures.complain = [this](const std::string& what) { complain(what); };
-  pictures_ = std::make_unique<PictureRecorder>(std::move(pictures), disk);
+  auto sink = options.format == "png" ? png_sink(disk, cam0)
+                                      : ffv1_sink(disk, cam0, {camera.width(), camera.height()}, rate_hz);
+  pictures_ = std::make_unique<PictureRecorder>(std::move(pictures), std::move(sink));
   thread_ = std::thread([this] { run(); });
 }
 

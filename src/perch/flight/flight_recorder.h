@@ -25,6 +25,8 @@ namespace perch {
 struct RecorderOptions {
   std::filesystem::path folder;  // made where missing; the flight is a new folder in it, named by its start
   int queue_frames = 30;         // pictures that wait for the disk: a second's, 9 MB of 640x480
+  // Or "ffv1": one video, about as large and twice the work; pictures of the camera's size only.
+  std::string format = "png";
   // Below it no more pictures: the tables, which are small, and the rest of the system need some.
   double least_free_disk = 200e6;  // bytes
   std::shared_ptr<RecordingDisk> disk = real_disk();

@@ -1,19 +1,14 @@
 #include "perch/flight/picture_recorder.h"
 
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "perch/flight/background.h"
 
 namespace perch {
 
-namespace fs = std::filesystem;
-
-PictureRecorder::PictureRecorder(Options options, RecordingDisk& disk)
-    : options_(std::move(options)), disk_(disk), slots_(static_cast<size_t>(options_.slots)) {
-  fs::create_directories(options_.cam0 / "data");
-  rows_ = disk_.create(options_.cam0 / "data.csv");
-  rows_->append("#timestamp [ns],filename\n");
+PictureRecorder::PictureRecorder(Options options, std::unique_ptr<PictureSink> sink)
+    : options_(std::move(options)), sink_(std::move(sink)), slots_(static_cast<size_t>(options_.slots)) {
+  for (Slot& slot : slots_) slot.grey = cv::Mat::zeros(options_.size, CV_8UC1);  // not amid the flight
   thread_ = std::thread([this] { run(); });
 }
 
@@ -27,6 +22,7 @@ void PictureRecorder::close() {
   }
   changed_.notify_one();
   thread_.join();
+  sink_.reset();
 }
 
 bool PictureRecorder::drop(const std::string& why) {
@@ -71,7 +67,8 @@ void PictureRecorder::run() {
     const Slot& slot = slots_[begin_];
     lock.unlock();
     try {
-      write(slot);
+      if (!options_.may_write()) throw std::runtime_error("too little is left on the disk for pictures");
+      sink_->write(slot.timestamp_ns, slot.grey);
       ++written_;
     } catch (const std::exception& e) {
       drop(e.what());
@@ -80,26 +77,6 @@ void PictureRecorder::run() {
     begin_ = (begin_ + 1) % slots_.size();
     --count_;
   }
-}
-
-void PictureRecorder::write(const Slot& slot) {
-  if (!options_.may_write()) throw std::runtime_error("too little is left on the disk for pictures");
-  const std::string name = std::to_string(slot.timestamp_ns) + ".png";
-  if (!slot.grey.empty()) {
-    // Noise does not compress: the fastest level costs 3 % of space.
-    if (!cv::imencode(".png", slot.grey, encoded_, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
-      throw std::runtime_error(name + ": cannot be encoded");
-    }
-    const fs::path file = options_.cam0 / "data" / name;
-    try {
-      disk_.create(file)->append({reinterpret_cast<const char*>(encoded_.data()), encoded_.size()});
-    } catch (const std::exception&) {
-      std::error_code ignored;
-      fs::remove(file, ignored);
-      throw;
-    }
-  }
-  rows_->append(std::to_string(slot.timestamp_ns) + "," + name + "\n");
 }
 
 }  // namespace perch

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -13,25 +12,24 @@
 #include <vector>
 
 #include "perch/camera/image_source.h"
-#include "perch/flight/recording_disk.h"
+#include "perch/flight/picture_sink.h"
 
 namespace perch {
 
-// cam0/data and cam0/data.csv of a flight that goes on, written by a thread of its own:
+// The pictures of a flight that goes on, written by a thread of its own:
 //
-//   add: copies into a free slot, or drops --> slots, a ring --> thread: FILE.png whole, then its row
+//   add: copies into a free slot, or drops --> slots, a ring --> thread: PictureSink
 //
 // Whenever the process ends, each row of data.csv has its picture whole.
 class PictureRecorder {
  public:
   struct Options {
-    std::filesystem::path cam0;  // exists
     int slots = 30;
+    cv::Size size;                                     // of the pictures to expect
     std::function<bool()> may_write;                   // false: too little is left on the disk
     std::function<void(const std::string&)> complain;  // from any thread
   };
-  // Throws std::runtime_error when data.csv cannot be made.
-  PictureRecorder(Options options, RecordingDisk& disk);
+  PictureRecorder(Options options, std::unique_ptr<PictureSink> sink);
   ~PictureRecorder();  // closes
   // Writes what was accepted and waits for that. No add() afterwards.
   void close();
@@ -52,18 +50,15 @@ class PictureRecorder {
   };
   bool drop(const std::string& why);
   void run();
-  void write(const Slot& slot);
 
   const Options options_;
-  RecordingDisk& disk_;
-  std::unique_ptr<RecordingFile> rows_;
+  std::unique_ptr<PictureSink> sink_;
   std::vector<Slot> slots_;
   size_t begin_ = 0, count_ = 0;  // of the ring
   bool stop_ = false;
   std::mutex mutex_;  // of the three above
   std::condition_variable changed_;
   std::optional<int64_t> last_ns_;
-  std::vector<uint8_t> encoded_;
   std::atomic<int64_t> written_ = 0, dropped_ = 0;
   std::thread thread_;
 };
