@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <memory>
 
+#include "flight_aids.h"
 #include "perch/analysis/output_files.h"
 #include "perch/analysis/overlay.h"
 #include "perch/estimator/estimator.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/flight.h"
-#include "perch/flight/head_angles.h"
-#include "perch/flight/recorded_aids.h"
 
 namespace perch {
 namespace {
@@ -39,72 +38,11 @@ FrameChain chain_of(const RunConfig& config, const Flight& flight) {
   return chain;
 }
 
-// What the flight's navigation said up to a frame, as it would have come in a live run.
-class RecordedAutopilot {
- public:
-  RecordedAutopilot(const NavTrack& nav, const FrameChain& chain) : nav_(nav), chain_(chain) {}
-
-  std::vector<AutopilotSample> until(int64_t camera_time_ns) {
-    std::vector<AutopilotSample> said;
-    const int64_t until_ns = navigation_time_ns(chain_, camera_time_ns);
-    for (; next_ < nav_.samples.size() && nav_.samples[next_].timestamp_ns <= until_ns; ++next_) {
-      const NavSample& nav = nav_.samples[next_];
-      AutopilotSample sample;
-      sample.timestamp_ns = camera_time_ns - (until_ns - nav.timestamp_ns);
-      sample.world_from_body = nav.world_from_body.rotation;
-      sample.body_velocity_in_world = nav.body_velocity_in_world;
-      said.push_back(sample);
-    }
-    return said;
-  }
-
- private:
-  const NavTrack& nav_;
-  const FrameChain& chain_;
-  size_t next_ = 0;
-};
-
-// What the estimator is given beside each picture, frame by frame in their order: what a live run's was given
-// where the flight is one of a live run, else what its navigation and gimbal say.
-class Aids {
- public:
-  Aids(const RunConfig& config, const Flight& flight, const FrameChain& chain)
-      : flight_(flight),
-        chain_(chain),
-        autopilot_(flight.nav, chain),
-        fuse_navigation_(config.tracking.fuse_navigation) {
-    if (config.replay_aids == ReplayAids::kRecorded && RecordedAids::are_there(flight.folder)) {
-      recorded_.emplace(flight.folder);
-    }
-  }
-
-  Estimator::Aid at(int64_t camera_time_ns) {
-    if (recorded_) return recorded_->at(camera_time_ns);
-    Estimator::Aid aid;
-    if (const auto nav = flight_.nav.at(navigation_time_ns(chain_, camera_time_ns))) {
-      aid.world_from_body = nav->world_from_body.rotation;
-    }
-    aid.angles = head_angles_at(flight_.gimbal, camera_time_ns);
-    if (fuse_navigation_) aid.autopilot = autopilot_.until(camera_time_ns);
-    return aid;
-  }
-  std::vector<std::string> problems() const {
-    return recorded_ ? recorded_->problems() : std::vector<std::string>{};
-  }
-
- private:
-  const Flight& flight_;
-  const FrameChain& chain_;
-  RecordedAutopilot autopilot_;
-  bool fuse_navigation_;
-  std::optional<RecordedAids> recorded_;
-};
-
 // Decodes in parallel and estimates in order: a frame's result may depend on those before it.
 void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator,
                      FlightResult& result) {
   using FramePtr = std::shared_ptr<Frame>;
-  Aids aids(job.config, result.flight, result.chain);
+  FlightAids aids(result.flight, result.chain, job.config);
   tbb::parallel_pipeline(
       kFramesAhead,
       tbb::make_filter<void, FramePtr>(tbb::filter_mode::serial_in_order,

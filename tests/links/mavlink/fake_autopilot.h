@@ -67,6 +67,11 @@ class FakeAutopilot {
 
   // Does what it does at this moment, and hands over what arrives at our side.
   void step(int64_t now_ns, VehicleLink& link) {
+    step(now_ns,
+         [&](const std::vector<uint8_t>& bytes, int64_t due_ns) { link.receive(bytes, due_ns, true); });
+  }
+  template <class HandOver>
+  void step(int64_t now_ns, const HandOver& hand_over) {
     while (!incoming_.empty() && incoming_.front().due_ns <= now_ns) {
       parser_.parse_datagram(incoming_.front().bytes, [&](const Frame& frame) { handle(frame, now_ns); });
       incoming_.pop_front();
@@ -78,7 +83,7 @@ class FakeAutopilot {
       }
     }
     while (!outgoing_.empty() && outgoing_.front().due_ns <= now_ns) {
-      link.receive(outgoing_.front().bytes, outgoing_.front().due_ns, true);
+      hand_over(outgoing_.front().bytes, outgoing_.front().due_ns);
       outgoing_.pop_front();
     }
   }

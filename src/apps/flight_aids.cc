@@ -1,0 +1,44 @@
+#include "flight_aids.h"
+
+#include "perch/flight/head_angles.h"
+
+namespace perch {
+
+FlightAids::FlightAids(const Flight& flight, const FrameChain& chain, const RunConfig& config)
+    : flight_(flight), chain_(chain), fuse_navigation_(config.tracking.fuse_navigation) {
+  if (config.replay_aids == ReplayAids::kRecorded && RecordedAids::are_there(flight.folder)) {
+    recorded_.emplace(flight.folder);
+  }
+}
+
+Estimator::Aid FlightAids::at(int64_t camera_time_ns) {
+  if (recorded_) return recorded_->at(camera_time_ns);
+  Estimator::Aid aid;
+  if (const auto nav = flight_.nav.at(navigation_time_ns(chain_, camera_time_ns))) {
+    aid.world_from_body = nav->world_from_body.rotation;
+  }
+  aid.angles = head_angles_at(flight_.gimbal, camera_time_ns);
+  if (fuse_navigation_) aid.autopilot = said_until(camera_time_ns);
+  return aid;
+}
+
+// What the flight's navigation said up to a frame, as it would have come in a live run.
+std::vector<AutopilotSample> FlightAids::said_until(int64_t camera_time_ns) {
+  std::vector<AutopilotSample> said;
+  const int64_t until_ns = navigation_time_ns(chain_, camera_time_ns);
+  const auto& samples = flight_.nav.samples;
+  for (; next_ < samples.size() && samples[next_].timestamp_ns <= until_ns; ++next_) {
+    AutopilotSample sample;
+    sample.timestamp_ns = camera_time_ns - (until_ns - samples[next_].timestamp_ns);
+    sample.world_from_body = samples[next_].world_from_body.rotation;
+    sample.body_velocity_in_world = samples[next_].body_velocity_in_world;
+    said.push_back(sample);
+  }
+  return said;
+}
+
+std::vector<std::string> FlightAids::problems() const {
+  return recorded_ ? recorded_->problems() : std::vector<std::string>{};
+}
+
+}  // namespace perch

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "perch/config/section.h"
+#include "perch/estimator/run_config.h"
+#include "perch/links/mavlink/mavlink_options.h"
+#include "perch/links/stream_url.h"
+
+namespace perch {
+
+// Where attitude and velocity come from beside the pictures.
+enum class NavSource {
+  kNone,
+  kFlight,   // what the replayed flight has recorded
+  kMavlink,  // an autopilot
+};
+
+// What perch-live reads of its YAML file (docs/FORMATS.md, Configuration).
+struct LiveConfig {
+  RunConfig run;
+  NavSource nav = NavSource::kNone;
+  std::optional<StreamUrl> autopilot;  // with kMavlink
+  mavlink::MavlinkOptions mavlink;
+  std::filesystem::path record;  // outputs.record; empty: nothing is recorded
+};
+
+// Throws ConfigError for anything that is not as it should be; nothing starts then.
+LiveConfig read_live_config(Section root);
+
+// camera.source is a recorded flight.
+inline bool is_replay(const LiveConfig& config) { return config.run.source.starts_with("flight:"); }
+
+}  // namespace perch
