@@ -17,7 +17,7 @@ constexpr int64_t kSecond = 1'000'000'000;
 // three times.
 constexpr int64_t kMostWait = 30 * kSecond;
 // Rates are those of 2 to 4 s after the last request.
-constexpr int64_t kRatesSettle = 5 * kSecond;
+constexpr int64_t kRatesSettle = 4 * kSecond;
 constexpr int64_t kMostPatience = 60 * kSecond;  // of a move on the bench
 constexpr auto kLook = 20ms;
 

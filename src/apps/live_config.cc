@@ -11,18 +11,18 @@ void read_nav(Section& root, LiveConfig& config) {
   std::string nav = is_replay(config) ? "flight" : "none";
   root.read("nav", nav);
   if (nav == "none") return;
+  config.nav = NavSource::kFlight;
   if (nav == "flight") {
     // A camera that runs has no recording of an autopilot beside it.
     if (!is_replay(config)) root.fail("nav", "none or mavlink+URL, as camera.source is no flight");
-    config.nav = NavSource::kFlight;
     return;
   }
   if (!nav.starts_with(kMavlinkPrefix)) root.fail("nav", "none, flight or mavlink+URL");
-  // What was seen then must not steer a vehicle now.
-  if (is_replay(config)) root.fail("nav", "none or flight, as camera.source is a recorded flight");
-  config.nav = NavSource::kMavlink;
   try {
-    config.autopilot = parse_stream_url(nav);
+    const StreamUrl url = parse_stream_url(nav);
+    if (is_replay(config)) return;
+    config.nav = NavSource::kMavlink;
+    config.autopilot = url;
   } catch (const ConfigError& e) {
     root.fail("nav", std::string("mavlink+ and the URL of a byte stream (") + e.what() + ")");
   }
@@ -37,10 +37,14 @@ LiveConfig read_live_config(Section root) {
   read_nav(root, config);
   Section outputs = root.section("outputs");
   config.mavlink = mavlink::read_mavlink_options(outputs);
-  if (config.mavlink.send && config.nav != NavSource::kMavlink) {
+  if (outputs.has("record")) outputs.read("record", config.record);
+  if (is_replay(config)) {
+    // What was seen then must not steer a vehicle now, and is recorded already.
+    config.mavlink.send = false;
+    config.record.clear();
+  } else if (config.mavlink.send && config.nav != NavSource::kMavlink) {
     outputs.section("mavlink").fail("send", "false, as nav is no autopilot");
   }
-  if (outputs.has("record")) outputs.read("record", config.record);
   outputs.done();
   return config;
 }

@@ -26,7 +26,9 @@ struct LiveConfig {
   std::filesystem::path record;  // outputs.record; empty: nothing is recorded
 };
 
-// Throws ConfigError for anything that is not as it should be; nothing starts then.
+// Of a replay `nav: mavlink+URL` means what the flight has recorded of it: the configuration of the live run
+// can be used as it is. Nothing is sent then, and nothing recorded. Throws ConfigError for anything that is
+// not as it should be; nothing starts then.
 LiveConfig read_live_config(Section root);
 
 // camera.source is a recorded flight.

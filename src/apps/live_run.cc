@@ -105,8 +105,8 @@ void LiveRun::capture() {
       last = current;
     }
     if (captured_++ == 0) {
-      LOG(INFO) << "camera: first picture " << picture->frame.grey.cols << "x" << picture->frame.grey.rows
-                << ", exposed at " << picture->frame.timestamp_ns << " ns";
+      LOG(INFO) << "camera: first picture, " << picture->frame.name << ", " << picture->frame.grey.cols << "x"
+                << picture->frame.grey.rows << ", exposed at " << picture->frame.timestamp_ns << " ns";
     }
     if (!slot_.put(*picture)) break;
   }

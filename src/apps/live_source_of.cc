@@ -16,27 +16,26 @@ std::string rest_of(const std::string& source) { return source.substr(source.fin
 
 OpenedSource open_source_of(const LiveConfig& config) {
   const RunConfig& run = config.run;
+  std::unique_ptr<LiveSource> pictures;
   std::optional<CameraModel> camera;
-  OpenedSource opened{nullptr, CameraModel::pinhole(1, 1, 0, 0, 1, 1), std::nullopt, std::nullopt};
+  std::optional<Rigid3> body_from_camera;
+  std::optional<Flight> flight;
   if (is_replay(config)) {
-    opened.flight = read_flight(rest_of(run.source));
-    camera = opened.flight->camera;
-    opened.body_from_camera = opened.flight->body_from_camera;
-  }
-  if (run.source.starts_with("sim:")) {
+    flight = read_flight(rest_of(run.source));
+    camera = flight->camera;
+    body_from_camera = flight->body_from_camera;
+  } else if (run.source.starts_with("sim:")) {
     auto simulation = open_live_simulation(rest_of(run.source), run.live);
     camera = simulation->flight().simulation().camera;
-    opened.body_from_camera = simulation->flight().simulation().body_from_camera;
-    opened.pictures = std::move(simulation);
-  } else {
-    opened.pictures = open_live_source(run.source, run.live, run.channel);
+    body_from_camera = simulation->flight().simulation().body_from_camera;
+    pictures = std::move(simulation);
   }
   if (!run.camera_model.empty()) camera = read_camera_model(run.camera_model);
   if (!camera) {
-    throw ConfigError("camera.model: expected the camera's model, as " + run.source + " does not tell it");
+    throw ConfigError("camera.model: expected the camera's model, as camera.source does not tell it");
   }
-  opened.camera = *camera;
-  return opened;
+  if (!pictures) pictures = open_live_source(run.source, run.live, run.channel);
+  return {std::move(pictures), *camera, body_from_camera, std::move(flight)};
 }
 
 }  // namespace perch

@@ -1,0 +1,320 @@
+// perch-live as a pilot starts it: a simulated camera, and an autopilot at the other end of a UDP link whose
+// clock is offset and drifts and whose messages come late and jitter.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "apps/udp_autopilot.h"
+#include "perch/flight/estimates_file.h"
+#include "perch/simulation/live_simulation.h"
+#include "support/child_program.h"
+#include "support/run_program.h"
+
+namespace perch {
+namespace {
+
+namespace fs = std::filesystem;
+using mavlink::kMs;
+using mavlink::kSecond;
+using mavlink::UdpAutopilot;
+using nlohmann::json;
+using testing::HasSubstr;
+
+// Small pictures from near, so that a busy machine keeps up with them.
+constexpr char kSimulation[] =
+    "camera: {width: 320, height: 240, lens: LENSMODEL_PINHOLE, intrinsics: [226, 226, 159.5, 119.5],"
+    " rate_hz: 15}\n"
+    "flight: {start_height: 4, start_aside: 0.5, touchdown_height: 1.5, duration: 14, hover: 10}\n";
+
+void sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+class PerchLive : public testing::Test {
+ protected:
+  PerchLive() {
+    const std::string target = "target: " + std::string(PERCH_SOURCE_DIR) + "/configs/targets/sharp.yaml\n";
+    folder_.write("sim.yaml", target + kSimulation);
+    folder_.write("run.yaml", target + "camera: {source: 'sim:sim.yaml'}\n" + "nav: " + autopilot_.url() +
+                                  "\noutputs: {mavlink: {}}\n");
+    flight_ = std::make_unique<SimulatedFlight>(read_simulation(Section::load(folder_ / "sim.yaml")));
+  }
+
+  ChildProgram start(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"--config", "run.yaml", "--summary", "summary.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return {folder_, PERCH_LIVE, arguments};
+  }
+  json summary() const { return json::parse(read_file(folder_ / "summary.json")); }
+
+  // Reads off the log when the flight began, and has the autopilot fly it.
+  void fly_with(const ChildProgram& live) {
+    ASSERT_TRUE(live.says(" ns\n", 20)) << live.err();
+    const std::string log = live.err();
+    const int64_t first = std::stoll(log.substr(log.find("first picture, ") + 15));
+    begin_ns_ = std::stoll(log.substr(log.find("exposed at ") + 11)) - first * kSecond / 15;
+    autopilot_.with([&](auto& autopilot) { autopilot.motion = [this](int64_t t) { return truth_at(t); }; });
+  }
+  double flight_time(int64_t time_ns) const { return 1e-9 * static_cast<double>(time_ns - begin_ns_); }
+  mavlink::TrueMotion truth_at(int64_t time_ns) const {
+    const VehicleTruth now = flight_->vehicle_at(flight_time(time_ns));
+    const VehicleTruth soon = flight_->vehicle_at(flight_time(time_ns + kMs));
+    const Eigen::Vector3d rate =
+        1e3 * so3_log(now.world_from_body.rotation.conjugate() * soon.world_from_body.rotation);
+    return {now.world_from_body, rate, now.body_velocity_in_world};
+  }
+  Eigen::Vector3d pad_in_body_at(int64_t time_ns) const {
+    return (inverse(flight_->vehicle_at(flight_time(time_ns)).world_from_body) *
+            flight_->pad_at(flight_time(time_ns)).world_from_pad)
+        .translation;
+  }
+  std::vector<UdpAutopilot::Arrival> landing_targets_since(int64_t time_ns) const {
+    auto all = autopilot_.landing_targets();
+    std::erase_if(all, [&](const auto& a) { return a.arrived_ns < time_ns; });
+    return all;
+  }
+  // Waits until so many have come since.
+  bool landing_targets_come(int64_t since_ns, size_t count, double seconds) const {
+    for (double t = 0; t < seconds; t += 0.02, sleep(0.02)) {
+      if (landing_targets_since(since_ns).size() >= count) return true;
+    }
+    return false;
+  }
+
+  TempFolder folder_;
+  UdpAutopilot autopilot_;
+  std::unique_ptr<SimulatedFlight> flight_;
+  int64_t begin_ns_ = 0;
+};
+
+// The bound of a vector's error: what the estimator itself says, and what a prediction from exposure to send
+// time cannot know: at 2 m/s^2 over 0.15 s, which a busy machine may take, 2 cm.
+constexpr double kPredicted = 0.02;  // m
+
+TEST_F(PerchLive, TellsArdupilotWhereThePadIsAndWhen) {
+  ChildProgram live = start({"--output", "out"});
+  fly_with(live);
+  ASSERT_TRUE(landing_targets_come(0, 30, 10)) << live.err();
+  EXPECT_TRUE(live.says("pad TRACK", 1));
+  EXPECT_EQ(live.stop(), 0) << live.err();
+
+  std::vector<std::string> problems;
+  std::map<int64_t, VehicleState> states;  // by the stamp, us
+  for (const VehicleState& state : read_states(folder_ / "out/states.csv", problems))
+    states[state.timestamp_ns / 1000] = state;
+  const double frame_ns = 1e9 / 15;
+  int64_t last_stamp = 0;
+  for (const auto& [arrived_ns, target] : autopilot_.landing_targets()) {
+    EXPECT_EQ(target.frame, mavlink::mav_frame::kBodyFrd);
+    EXPECT_EQ(target.position_valid, 1);
+    EXPECT_EQ(target.q, (std::array<float, 4>{}));
+    const Eigen::Vector3d sent(target.x, target.y, target.z);
+    EXPECT_NEAR(target.distance, sent.norm(), 1e-6 * sent.norm());  // floats
+    // Of an exposure of the simulated camera, each newer than the last.
+    const auto stamp_ns = static_cast<int64_t>(target.time_usec) * 1000;
+    EXPECT_GT(stamp_ns, last_stamp);
+    last_stamp = stamp_ns;
+    const double frames = static_cast<double>(stamp_ns - begin_ns_) / frame_ns;
+    EXPECT_NEAR(frames * frame_ns, std::round(frames) * frame_ns, 2e6);
+    // Where the pad is as of the send time less PLND_LAG.
+    const auto state = states.find(static_cast<int64_t>(target.time_usec));
+    ASSERT_NE(state, states.end());
+    EXPECT_EQ(state->second.source, StateSource::kVision);
+    const double sigma = std::sqrt(
+        inverse(UncertainRigid3{state->second.pad_from_body, state->second.covariance.topLeftCorner<6, 6>()})
+            .covariance.topLeftCorner<3, 3>()
+            .trace());
+    const int64_t lag_ns =
+        autopilot_.with([](auto& a) { return std::llround(a.parameters["PLND_LAG"] * 1e9); });
+    const Eigen::Vector3d truth = pad_in_body_at(arrived_ns - lag_ns);
+    EXPECT_LT((sent - truth).norm(), 4 * sigma + kPredicted)
+        << "sent " << sent.transpose() << ", true " << truth.transpose() << ", sigma " << sigma;
+  }
+  EXPECT_THAT(autopilot_.with([](auto& a) { return mavlink::text_of(a.texts.at(0).text); }),
+              HasSubstr("Perch: pad "));
+  const json closing = summary();
+  EXPECT_EQ(closing["mavlink"]["sent"], autopilot_.landing_targets().size());
+  EXPECT_GE(closing["latency_us"]["total"]["count"], 30);
+  EXPECT_NEAR(closing["mavlink"]["clock"]["skew"].get<double>(), 50e-6, 200e-6);  // of seconds with ms jitter
+}
+
+TEST_F(PerchLive, SaysNothingWrongThroughFaultsAndRecovers) {
+  autopilot_.with([](auto& autopilot) { autopilot.parameters["PLND_LAG"] = 0.02; });
+  ChildProgram live = start();
+  fly_with(live);
+  ASSERT_TRUE(landing_targets_come(0, 5, 10)) << live.err();
+
+  // Garbage, half a frame, another vehicle's heartbeat and attitude.
+  std::vector<uint8_t> foreign, garbage(300, 0xFD);
+  mavlink::FrameWriter other(42, 1);
+  mavlink::Heartbeat heartbeat;
+  heartbeat.autopilot = mavlink::mav_autopilot::kPx4;
+  other.append(foreign, heartbeat);
+  other.append(foreign, mavlink::AttitudeQuaternion{1, 0, 1, 0, 0, 9, 9, 9, {}});
+  for (int i = 0; i < 50; ++i) {
+    autopilot_.send_raw(garbage);
+    autopilot_.send_raw({foreign.begin(), foreign.begin() + 15});
+    autopilot_.send_raw(foreign);
+  }
+  // Its clock is set; it loses half of all it hears and says.
+  autopilot_.with([](auto& autopilot) { autopilot.booted_ns -= 3 * kSecond; });
+  sleep(0.7);
+  autopilot_.with([](auto& autopilot) { autopilot.loss = 0.5; });
+  const int64_t lossy_ns = monotonic_ns();
+  EXPECT_TRUE(landing_targets_come(lossy_ns, 10, 5)) << live.err();
+  // The link is cut for longer than heartbeats may be missing, and comes back.
+  autopilot_.with([](auto& autopilot) {
+    autopilot.loss = 0;
+    autopilot.silent = true;
+  });
+  EXPECT_TRUE(live.says("link lost", 6)) << live.err();
+  const int64_t lost_ns = monotonic_ns();
+  sleep(0.5);
+  EXPECT_TRUE(landing_targets_since(lost_ns + 20 * kMs).empty());
+  autopilot_.with([](auto& autopilot) { autopilot.silent = false; });
+  const int64_t back_ns = monotonic_ns();
+  EXPECT_TRUE(landing_targets_come(back_ns, 10, 5)) << live.err();
+  EXPECT_EQ(live.stop(), 0) << live.err();
+
+  for (const auto& [arrived_ns, target] : autopilot_.landing_targets()) {
+    const Eigen::Vector3d sent(target.x, target.y, target.z);
+    const Eigen::Vector3d truth = pad_in_body_at(arrived_ns - 20 * kMs);
+    // Far less than any fault would make it: half a turn, 3 s.
+    EXPECT_LT((sent - truth).norm(), 0.1) << sent.transpose() << ", true " << truth.transpose();
+    const auto stamp_ns = static_cast<int64_t>(target.time_usec) * 1000;
+    EXPECT_LT(arrived_ns - stamp_ns, 500 * kMs);
+    EXPECT_GE(arrived_ns - stamp_ns, 0);
+  }
+  const json mavlink = summary()["mavlink"];
+  EXPECT_GE(mavlink["heard"]["foreign"], 50);
+  EXPECT_GE(mavlink["heard"]["skipped_bytes"], 50 * 300);
+  EXPECT_GE(mavlink["clock"]["steps"], 1);
+  EXPECT_EQ(mavlink["heard"]["times_lost"], 1);
+  EXPECT_EQ(mavlink["heard"]["times_up"], 2);
+  EXPECT_GT(mavlink["refused"]["no link"], 0);
+}
+
+// Without the times that a stage took: the last three columns.
+std::string estimates_without_times(const fs::path& file) {
+  std::istringstream rows(read_file(file));
+  std::string kept;
+  for (std::string row; std::getline(rows, row);) {
+    for (int i = 0; i < 3; ++i) row.erase(row.rfind(','));
+    kept += row + '\n';
+  }
+  return kept;
+}
+
+TEST_F(PerchLive, ARecordedRunIsReplayedBitForBit) {
+  {
+    ChildProgram live = start({"--set", "outputs.record=flights"});
+    fly_with(live);
+    ASSERT_TRUE(landing_targets_come(0, 20, 10)) << live.err();
+    EXPECT_EQ(live.stop(), 0) << live.err();
+  }
+  EXPECT_EQ(summary()["recording"]["frames_dropped"], 0);
+  const fs::path flight = summary()["recording"]["folder"].get<std::string>();
+  const fs::path recorded = (folder_ / "x").parent_path() / flight;
+  EXPECT_GT(fs::file_size(recorded / "run/mavlink.tlog"), 10'000u);
+  EXPECT_TRUE(fs::exists(recorded / "run/summary.json"));
+  const auto more = " --config " + (recorded / "run/config.yaml").string();
+  const Outcome again = run_program_in(
+      folder_, PERCH_LIVE,
+      more + " --set camera.pace=fast --output again --set camera.source=flight:" + recorded.string());
+  ASSERT_EQ(again.code, 0) << again.err;
+  const Outcome batch = run_program_in(folder_, PERCH_BATCH, more + " --output batch " + recorded.string());
+  ASSERT_EQ(batch.code, 0) << batch.err;
+  const std::string live_rows = estimates_without_times(recorded / "run/estimates.csv");
+  const std::string live_states = read_file(recorded / "run/states.csv");
+  EXPECT_GT(std::count(live_rows.begin(), live_rows.end(), '\n'), 20);
+  for (const fs::path& folder : {folder_ / "again", folder_ / "batch" / recorded.filename()}) {
+    EXPECT_TRUE(estimates_without_times(folder / "estimates.csv") == live_rows) << folder;
+    EXPECT_TRUE(read_file(folder / "states.csv") == live_states) << folder;
+  }
+}
+
+TEST_F(PerchLive, ACameraThatHangsIsNotBelieved) {
+  // The same picture again and again, with new times: the first is a measurement, the others are none.
+  cv::imwrite((folder_ / "frozen.png").string(), flight_->picture(0));
+  const std::string model =
+      "{'lensmodel': 'LENSMODEL_PINHOLE', 'extrinsics': [0, 0, 0, 0, 0, 0], "
+      "'intrinsics': [226, 226, 159.5, 119.5], 'imagersize': [320, 240]}";
+  folder_.write("frozen.cameramodel", model);
+  ChildProgram live = start(
+      {"--set", "camera.model=frozen.cameramodel", "--set", "frames.body_from_base=identity", "--set",
+       "camera.source=gst:multifilesrc location=" + (folder_ / "frozen.png").string() +
+           " loop=true caps=image/png,framerate=15/1 ! pngdec ! videoconvert ! video/x-raw,format=GRAY8 ! "
+           "identity sync=true"});
+  EXPECT_TRUE(live.says("pad LOST", 10)) << live.err();
+  EXPECT_EQ(live.stop(), 0) << live.err();
+  EXPECT_LE(autopilot_.landing_targets().size(), 1u);
+  const json closing = summary();
+  EXPECT_EQ(closing["frames"], 1);
+  EXPECT_GT(closing["repeated"], 10);
+}
+
+TEST_F(PerchLive, TellsTheServiceManagerThatAllGoOn) {
+  const std::string name = folder_ / "notify";
+  const int fd = socket(AF_UNIX, SOCK_DGRAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  name.copy(address.sun_path, sizeof(address.sun_path) - 1);
+  ASSERT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+  setenv("NOTIFY_SOCKET", name.c_str(), 1);
+  setenv("WATCHDOG_USEC", "800000", 1);
+  {
+    ChildProgram live = start();
+    unsetenv("NOTIFY_SOCKET");
+    unsetenv("WATCHDOG_USEC");
+    ASSERT_TRUE(live.says("pad TRACK", 20)) << live.err();
+    live.signal(SIGHUP);
+    EXPECT_TRUE(live.says("SIGHUP: nothing is reloaded", 2)) << live.err();
+    sleep(0.5);
+    EXPECT_EQ(live.stop(), 0) << live.err();
+  }
+  std::map<std::string, int> said;
+  char text[256];
+  for (ssize_t size = 0; (size = recv(fd, text, sizeof(text), MSG_DONTWAIT)) >= 0;)
+    ++said[std::string(text, static_cast<size_t>(size))];
+  close(fd);
+  EXPECT_EQ(said["READY=1"], 1);
+  EXPECT_EQ(said["STATUS=TRACK"], 1);
+  EXPECT_EQ(said["STOPPING=1"], 1);
+  EXPECT_GE(said["WATCHDOG=1"], 2);
+}
+
+TEST_F(PerchLive, TheDoctorSaysWhatIsWrong) {
+  autopilot_.with([](auto& autopilot) {
+    // One that is not there is asked for several times.
+    for (const auto& name : mavlink::landing_parameters(autopilot.autopilot)) autopilot.parameters[name] = 1;
+    autopilot.parameters["PLND_TYPE"] = 2;
+  });
+  ChildProgram live = ChildProgram(folder_, PERCH_LIVE, {"--config", "run.yaml", "--check"});
+  EXPECT_EQ(live.wait(35), 1) << live.err();
+  EXPECT_THAT(live.out(), HasSubstr("autopilot: ArduPilot 4.6.0, system 1\n"));
+  EXPECT_THAT(live.out(), HasSubstr("error: PLND_TYPE is 2: LANDING_TARGET is listened to"));
+  EXPECT_TRUE(autopilot_.landing_targets().empty());
+}
+
+TEST_F(PerchLive, RefusesAWrongConfigurationWithItsPlace) {
+  const auto error_of = [&](const std::string& set) {
+    const Outcome outcome = run_program_in(folder_, PERCH_LIVE, "--config run.yaml --set '" + set + "'");
+    EXPECT_EQ(outcome.code, 2) << set;
+    return outcome.err;
+  };
+  EXPECT_THAT(error_of("outputs.station.listen=8080"), HasSubstr("outputs.station: expected one of"));
+  EXPECT_THAT(error_of("nav=udp:1:2"), HasSubstr("nav: expected none, flight or mavlink+URL"));
+  EXPECT_THAT(error_of("nav=mavlink+udp:host"), HasSubstr("expected HOST:PORT"));
+  EXPECT_THAT(error_of("nav=none"),
+              HasSubstr("outputs.mavlink.send: expected false, as nav is no autopilot"));
+  EXPECT_THAT(error_of("nav=flight"), HasSubstr("as camera.source is no flight"));
+  EXPECT_THAT(error_of("camera.source=gst:videotestsrc"), HasSubstr("camera.model: expected"));
+}
+
+}  // namespace
+}  // namespace perch
