@@ -28,6 +28,19 @@ void read_nav(Section& root, LiveConfig& config) {
   }
 }
 
+// A folder; or the folder and how pictures are written.
+void read_record(Section& outputs, LiveConfig& config) {
+  if (!outputs.is_mapping_with("record", "folder")) {
+    if (outputs.has("record")) outputs.read("record", config.record);
+    return;
+  }
+  Section record = outputs.section("record");
+  record.read("folder", config.record);
+  record.read_choice("format", config.record_format,
+                     {{"png", std::string("png")}, {"ffv1", std::string("ffv1")}});
+  record.done();
+}
+
 }  // namespace
 
 LiveConfig read_live_config(Section root) {
@@ -37,7 +50,7 @@ LiveConfig read_live_config(Section root) {
   read_nav(root, config);
   Section outputs = root.section("outputs");
   config.mavlink = mavlink::read_mavlink_options(outputs);
-  if (outputs.has("record")) outputs.read("record", config.record);
+  read_record(outputs, config);
   if (is_replay(config)) {
     // What was seen then must not steer a vehicle now, and is recorded already.
     config.mavlink.send = false;

@@ -24,6 +24,7 @@ struct LiveConfig {
   std::optional<StreamUrl> autopilot;  // with kMavlink
   mavlink::MavlinkOptions mavlink;
   std::filesystem::path record;  // outputs.record; empty: nothing is recorded
+  std::string record_format = "png";
 };
 
 // Of a replay `nav: mavlink+URL` means what the flight has recorded of it: the configuration of the live run

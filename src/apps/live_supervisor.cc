@@ -109,6 +109,7 @@ std::unique_ptr<FlightRecorder> make_recorder(const Opened& opened) {
   if (opened.config.record.empty()) return nullptr;
   RecorderOptions options;
   options.folder = opened.config.record;
+  options.format = opened.config.record_format;
   const auto& frames = opened.config.run.frames;
   std::optional<Rigid3> body_from_camera;
   if (frames.body_from_base && !frames.pan_tilt)
