@@ -32,6 +32,7 @@ TEST(RunConfig, NeedsNothingButATarget) {
   EXPECT_EQ(config.detection.paper.threshold_fraction, 0.65);
   EXPECT_FALSE(config.frames.body_from_base);
   EXPECT_EQ(config.replay_aids, ReplayAids::kRecorded);
+  EXPECT_TRUE(config.detection.follow);
 }
 
 TEST(RunConfig, ReadsEveryPartOfTheFile) {
@@ -40,7 +41,7 @@ target: targets/sharp.yaml
 camera: {source: "images:*.png", model: cam.cameramodel, channel: green, width: 640, height: 480, rate: 30,
          format: YUYV, exposure: 0.004, gain: 12, latency: 0.02, pace: fast}
 frames: {body_from_base: identity}
-detection: {method: paper, paper: {threshold_fraction: 0.5, min_component_px: 7}}
+detection: {method: paper, follow: false, paper: {threshold_fraction: 0.5, min_component_px: 7}}
 pose: {max_rms_sigmas: 2}
 tracking: {coast: 3, history: 0.2, fuse_navigation: true}
 replay: {aids: navigation}
@@ -61,6 +62,7 @@ outputs: {station: {listen: "127.0.0.1:8080"}}
   EXPECT_TRUE(config.frames.body_from_base);
   EXPECT_EQ(config.detection.paper.threshold_fraction, 0.5);
   EXPECT_EQ(config.detection.paper.min_component_px, 7);
+  EXPECT_FALSE(config.detection.follow);
   EXPECT_EQ(config.pose.max_rms_sigmas, 2);
   EXPECT_EQ(config.tracking.coast, 3);
   EXPECT_EQ(config.tracking.history, 0.2);
@@ -84,6 +86,8 @@ TEST(RunConfig, NamesTheLineAndTheKeyOfWhatIsWrong) {
               testing::StartsWith("run.yaml:2: camera.exposure: expected"));
   EXPECT_THAT(complaint("target: targets/sharp.yaml\ncamera: {source: /dev/video0}\n"),
               testing::StartsWith("run.yaml:2: camera.source: expected a source, KIND:WHAT"));
+  EXPECT_THAT(complaint("target: targets/sharp.yaml\ndetection: {follow: 1}\n"),
+              testing::StartsWith("run.yaml:2: detection.follow: expected"));
   EXPECT_THAT(complaint("target: targets/sharp.yaml\ncamara: {}\n"),
               testing::StartsWith("run.yaml:2: camara"));
   EXPECT_THAT(complaint("target: targets/sharp.yaml\ndetection: {paper: {fraction: 0.5}}\n"),

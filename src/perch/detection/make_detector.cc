@@ -6,6 +6,7 @@ DetectionOptions read_detection_options(Section detection) {
   DetectionOptions options;
   detection.read_choice("method", options.method,
                         {{"edges", DetectionMethod::kEdges}, {"paper", DetectionMethod::kPaper}});
+  detection.read("follow", options.follow);
   options.edges = read_edges_options(detection.section("edges"));
   options.paper = read_paper_options(detection.section("paper"));
   options.apriltag = read_apriltag_options(detection.section("apriltag"));

@@ -16,6 +16,8 @@ enum class DetectionMethod { kEdges, kPaper };
 
 struct DetectionOptions {
   DetectionMethod method = DetectionMethod::kEdges;  // of a target of squares
+  // Whether the target is first looked for where the frames before lead to expect it.
+  bool follow = true;
   EdgesOptions edges;
   PaperOptions paper;
   AprilTagOptions apriltag;  // of a target that is an AprilTag board

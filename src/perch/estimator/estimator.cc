@@ -80,6 +80,7 @@ Estimator::Estimator(const RunConfig& config, const CameraModel& camera)
     : camera_(camera),
       frames_(config.frames),
       gravity_sigma_(config.pose.gravity_sigma_deg * kRadFromDeg),
+      follow_(config.detection.follow),
       detector_(make_detector(config.target, camera, config.detection)),
       pose_(config.target, camera, config.pose),
       filter_(config.tracking) {}
@@ -100,7 +101,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
   }
   Stopwatch stopwatch(estimate.stages);
   const auto prediction = predict(frame.timestamp_ns, aid.angles);
-  const Detection& detection = detector_->detect(frame.grey, prediction);
+  const Detection& detection = detector_->detect(frame.grey, follow_ ? prediction : std::nullopt);
   estimate.detect_us = stopwatch.since_lap_us();
   estimate.stages = detection.stages;
   estimate.correspondences = detection.correspondences;

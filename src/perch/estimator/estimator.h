@@ -41,6 +41,7 @@ class Estimator {
   CameraModel camera_;
   FrameChain frames_;
   double gravity_sigma_;  // rad
+  bool follow_;
   std::unique_ptr<Detector> detector_;
   PoseEstimator pose_;
   Deformation deformation_;
