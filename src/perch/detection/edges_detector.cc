@@ -36,6 +36,9 @@ constexpr int kLeastSide = 100;  // px
 // A prediction is off by as much as its sigma says, at most so far.
 constexpr double kPredictionRadius = 10;  // px, beyond which the whole picture is the better place to look
 
+// Found edges of those asked for: what explains as many where it was expected needs no rival.
+constexpr double kExplained = 0.85;
+
 // A piece of an edge for the fine fit: an arc over this length is a parabola to a hundredth of a pixel.
 constexpr double kPiece = 32;  // px
 
@@ -51,6 +54,8 @@ struct Level {
   CameraModel camera;
   RegionSearch regions;
 };
+
+bool is_explained(const Confirmed& found) { return found.found >= kExplained * found.asked; }
 
 // The camera that takes the picture at half the size: pixel x covers 2 x and 2 x + 1.
 CameraModel halved(const CameraModel& camera) {
@@ -149,8 +154,20 @@ std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const 
   const double radius = 3 * focal * std::hypot(shift, turn);
   // A prediction is mostly far better than what it promises; one that is not is not confirmed.
   if (!(radius < 0.5 * focal * target.size / distance)) return std::nullopt;
-  return confirmation.confirm(grey, H, std::clamp(radius, 2.0, kPredictionRadius),
-                              {1, 2, options.min_found, options.min_contrast});
+  const Requirement requirement{1, 2, options.min_found, options.min_contrast};
+  auto found = confirmation.confirm(grey, H, std::clamp(radius, 2.0, kPredictionRadius), requirement);
+  if (!found || is_explained(*found)) return found;
+  int squares = 0;
+  for (size_t i = 0; i < edges.shapes.size(); ++i) {
+    squares += edges.shapes[i].kind == ShapeKind::kSquare && found->seen[i];
+  }
+  if (squares < kLeastSquares) return std::nullopt;
+  // Turned in itself by a quarter, the target still shows all of its border and half of its squares.
+  for (int quarters = 1; quarters < 4; ++quarters) {
+    const Eigen::Matrix3d turned(Eigen::AngleAxisd(quarters * M_PI / 2, Eigen::Vector3d::UnitZ()));
+    if (confirmation.confirm(grey, found->image_from_plane * turned, 8, requirement)) return std::nullopt;
+  }
+  return found;
 }
 
 // In the whole picture: what one threshold shows, and where that is nothing, ever more local ones.
@@ -312,11 +329,18 @@ const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<
 
   Stopwatch stopwatch(w.detection.stages);
   w.confirmed.clear();
+  std::optional<Confirmed> followed;
   if (prediction) {
-    if (const auto followed = w.follow(grey, *prediction)) w.confirmed.push_back(*followed);
+    followed = w.follow(grey, *prediction);
     stopwatch.lap("follow");
   }
-  if (w.confirmed.empty()) w.search(grey, stopwatch);
+  // Where much is missing of what was expected, the whole picture may have something better.
+  if (followed && is_explained(*followed)) {
+    w.confirmed.push_back(*followed);
+  } else {
+    w.search(grey, stopwatch);
+    if (followed && w.confirmed.empty()) w.confirmed.push_back(*followed);
+  }
   if (w.confirmed.empty()) return w.detection;
   if (w.confirmed.size() > 1) {
     w.detection.status = DetectionStatus::kAmbiguous;
