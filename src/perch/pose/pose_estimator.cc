@@ -36,6 +36,11 @@ constexpr double kSameMinimum = 0.01;  // rad
 // off by its noise.
 constexpr double kSameWithinNoise = 9;
 
+// Edges that no pose brings nearer than this are not those of one flat target: smeared ones, double, or half
+// of them others. Those of targets are within 0.35 px at the worst noise, within 0.65 px without a lens
+// model.
+constexpr double kMostEdgeRms = 0.7;  // px
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Eigen::Vector3d normal_of(const Rigid3& camera_from_target) {
@@ -337,6 +342,9 @@ PoseResult PoseEstimator::estimate(const PlaneMeasurement& measured, std::span<c
     if (*minimum) *minimum = minimum_at(plane, (*minimum)->camera_from_target.mean);
   }
   if (!best) return result;
+  result.reprojection_rms_px = best->rms_px;
+  // Not "greater than": a NaN is refused too.
+  if (!(best->rms_px <= kMostEdgeRms)) return result;
   decide(*best, second, hints, result);
   return result;
 }
