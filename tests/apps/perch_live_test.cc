@@ -233,7 +233,8 @@ TEST_F(PerchLive, ARecordedRunIsReplayedBitForBit) {
   const std::string live_states = read_file(recorded / "run/states.csv");
   EXPECT_GT(std::count(live_rows.begin(), live_rows.end(), '\n'), 20);
   for (const fs::path& folder : {folder_ / "again", folder_ / "batch" / recorded.filename()}) {
-    EXPECT_TRUE(estimates_without_times(folder / "estimates.csv") == live_rows) << folder;
+    EXPECT_TRUE(estimates_without_times(folder / "estimates.csv") == live_rows)
+        << folder << again.err << batch.out << batch.err;
     EXPECT_TRUE(read_file(folder / "states.csv") == live_states) << folder;
   }
 }
