@@ -89,7 +89,7 @@ TEST_P(RealPhotos, AreFoundWhereAPersonSeesTheBoard) {
     if (GetParam() == Channel::kRed && r.status != PoseStatus::kOk) continue;
     ASSERT_EQ(r.status, PoseStatus::kOk) << p.name;
     std::printf("%s: %.3f px, %.1f px from the eye's\n", p.name, r.rms_px, r.worst_px);
-    EXPECT_LT(r.rms_px, GetParam() == Channel::kRed ? 0.65 : 0.6) << p.name;
+    EXPECT_LT(r.rms_px, 0.6) << p.name;
     EXPECT_LT(r.worst_px, kByEye) << p.name;
   }
 }

@@ -37,9 +37,9 @@ constexpr double kSameMinimum = 0.01;  // rad
 constexpr double kSameWithinNoise = 9;
 
 // Edges that no pose brings nearer than this are not those of one flat target: smeared ones, double, or half
-// of them others. Those of targets are within 0.35 px at the worst noise, within 0.65 px without a lens
+// of them others. Those of targets are within 0.35 px at the worst noise, within 0.6 px without a lens
 // model.
-constexpr double kMostEdgeRms = 0.7;  // px
+constexpr double kMostEdgeRms = 0.6;  // px
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
