@@ -32,10 +32,7 @@ uint64_t fingerprint(const cv::Mat& picture) {
 
 RunConfig with_mount_of(const LiveConfig& config, const OpenedSource& source) {
   RunConfig run = config.run;
-  if (!run.frames.body_from_base && source.body_from_camera) {
-    run.frames.body_from_base =
-        *source.body_from_camera * inverse(base_from_camera(run.frames, HeadAngles{}));
-  }
+  run.frames.body_from_base = body_from_base_of(config, source);
   return run;
 }
 

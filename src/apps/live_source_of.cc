@@ -38,4 +38,10 @@ OpenedSource open_source_of(const LiveConfig& config) {
   return {std::move(pictures), *camera, body_from_camera, std::move(flight)};
 }
 
+std::optional<Rigid3> body_from_base_of(const LiveConfig& config, const OpenedSource& source) {
+  const FrameChain& frames = config.run.frames;
+  if (frames.body_from_base || !source.body_from_camera) return frames.body_from_base;
+  return *source.body_from_camera * inverse(base_from_camera(frames, HeadAngles{}));
+}
+
 }  // namespace perch

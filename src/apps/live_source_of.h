@@ -22,4 +22,8 @@ struct OpenedSource {
 // Throws ConfigError and std::runtime_error naming what cannot be opened, or is not known of the camera.
 OpenedSource open_source_of(const LiveConfig& config);
 
+// frames.body_from_base, or what follows from where the source says that its camera sits; empty: nobody
+// knows.
+std::optional<Rigid3> body_from_base_of(const LiveConfig& config, const OpenedSource& source);
+
 }  // namespace perch

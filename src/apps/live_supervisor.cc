@@ -91,11 +91,10 @@ struct Opened {
 Opened open(const fs::path& file, std::vector<std::string> overrides) {
   LiveConfig config = read_live_config(Section::load(file, overrides));
   OpenedSource source = open_source_of(config);
-  FrameChain& frames = config.run.frames;
-  if (!frames.body_from_base && source.body_from_camera) {
-    const Rigid3 mount = *source.body_from_camera * inverse(base_from_camera(frames, HeadAngles{}));
-    overrides.push_back(mount_override(mount));
-  } else if (!frames.body_from_base && config.mavlink.send) {
+  const auto mount = body_from_base_of(config, source);
+  if (mount && !config.run.frames.body_from_base) {
+    overrides.push_back(mount_override(*mount));
+  } else if (!mount && config.mavlink.send) {
     throw ConfigError(file.string() +
                       ": frames.body_from_base: expected where the camera sits on the vehicle, as the pad's "
                       "place is sent in the vehicle's axes");

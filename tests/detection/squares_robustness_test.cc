@@ -1,30 +1,11 @@
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 #include <opencv2/imgproc.hpp>
 
 #include "perch/detection/squares_detector.h"
+#include "support/count_allocations.h"
 #include "support/drawing.h"
 #include "support/random_picture.h"
 #include "support/sharp_target.h"
-
-namespace {
-std::atomic<int> allocations{0};
-}
-
-// The address sanitizer has its own new, and wants each block back by the one that gave it.
-#ifndef __SANITIZE_ADDRESS__
-// Counts what is allocated by new. Not inlined: GCC would see new return what malloc gave and warn of a
-// delete that does not match.
-[[gnu::noinline]] void* operator new(size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, size_t) noexcept { std::free(memory); }
-#endif
 
 namespace perch {
 namespace {

@@ -13,8 +13,8 @@ struct WidthSample {
 };
 
 // The picture's blur as the covariance (px^2) of a point's image: its squared deviation across an edge of
-// normal n is n' C n. A round one about the median width, stretched as far as the samples agree in it:
-// motion.
+// normal n is n' C n. A round one of about the expected width, wider and stretched (motion) as far as the
+// samples agree in it.
 Eigen::Matrix2d fit_blur(std::span<const WidthSample> samples, double expected_px);
 
 }  // namespace perch

@@ -94,7 +94,7 @@ bool solve(const Sums& s, EdgeFit::Piece& piece) {
   // Rounding to whole grey levels is a twelfth at least, however small the residuals of a few.
   const double explained = piece.b.dot(piece.own) + iw * piece.narrower;
   const double residual = std::max(0.0, cv::v_reduce_sum(s.ii) - explained);
-  piece.variance = (residual + 4 * 1.0) / (static_cast<double>(s.n) - 4 + 4) + 1.0 / 12;
+  piece.variance = (residual + 4 * 1.0) / static_cast<double>(s.n) + 1.0 / 12;
   return true;
 }
 

@@ -26,7 +26,8 @@ struct FitOptions {
 // err independently, and the offset's sigma follows from the grey residuals.
 //
 // A piece that had to find its levels alone would have to look far, at what lies there, and would take an
-// error of its light level for a shift; so white and black are planes over all pieces, as far as they are.
+// error of its light level for a shift; so white and black are one surface each over all pieces, where they
+// agree.
 class EdgeFit {
  public:
   EdgeFit();
@@ -39,8 +40,6 @@ class EdgeFit {
                const ImageFrame& frame, const FitOptions& options, std::vector<EdgeOffset>& offsets,
                std::vector<int>& pieces_measured);
 
-  const LevelSurface& white() const { return white_; }
-  const LevelSurface& black() const { return black_; }
   const Eigen::Matrix2d& blur() const { return blur_; }  // as in edge_blur.h
 
   struct Piece;

@@ -1,10 +1,8 @@
 #include "perch/detection/edges_detector.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 #include <stdexcept>
 
 #include "perch/detection/confirm.h"

@@ -32,7 +32,8 @@ struct PictureRow {
 // The picture of a target of squares as its grey levels, from a homography, blur and three levels: each shape
 // is an area between four straight edges, spread by a Gaussian. The chance that a point of it is inside is
 // the product of those of both pairs of edges, and what adjacent edges that are not at right angles have in
-// common (the series of the bivariate normal distribution, to third order, good to 1e-3 at 45 degrees).
+// common (the series of the bivariate normal distribution, to third order: where edges meet at 45 degrees,
+// half a percent of the step is left out).
 class PictureModel {
  public:
   PictureModel(const TargetEdges& edges, const CameraModel& camera) : edges_(edges), camera_(camera) {}
