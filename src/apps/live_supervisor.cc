@@ -134,6 +134,20 @@ nlohmann::ordered_json recording_json(const FlightRecorder& recorder) {
           {"bytes_dropped", counters.bytes_dropped},   {"last_problem", counters.last_problem}};
 }
 
+// The program's log, as it is on stderr, into the recording.
+class RecordedLog : public google::LogSink {
+ public:
+  explicit RecordedLog(FlightRecorder& recorder) : recorder_(recorder) { google::AddLogSink(this); }
+  ~RecordedLog() override { google::RemoveLogSink(this); }
+  void send(google::LogSeverity severity, const char*, const char* file, int line,
+            const google::LogMessageTime& time, const char* message, size_t length) override {
+    recorder_.add_log(ToString(severity, file, line, time, message, length));
+  }
+
+ private:
+  FlightRecorder& recorder_;
+};
+
 // Looks after a run: what changes is said once, how it goes every 10 s.
 class Supervisor {
  public:
@@ -223,6 +237,8 @@ int supervise(const fs::path& file, const std::vector<std::string>& overrides,
               const Supervision& supervision) {
   Opened opened = open(file, overrides);
   const auto recorder = make_recorder(opened);
+  std::optional<RecordedLog> log;
+  if (recorder) log.emplace(*recorder);
   std::optional<EstimateFiles> files;
   if (!supervision.output.empty()) files.emplace(supervision.output);
   const auto on_estimate = [&](const Frame& frame, const Estimator::Aid& aid, const Estimate& estimate) {

@@ -1,170 +1,22 @@
 #include "perch/flight/flight_recorder.h"
 
 #include <gmock/gmock.h>
-#include <signal.h>
-#include <sys/mman.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <set>
 #include <thread>
 
-#include "perch/flight/aids_file.h"
-#include "perch/flight/estimates_file.h"
-#include "perch/flight/flight.h"
+#include "flight/recording.h"
 #include "support/near_pose.h"
-#include "support/rng.h"
-#include "support/temp_folder.h"
 
 namespace perch {
 namespace {
 
-namespace fs = std::filesystem;
-using namespace std::chrono_literals;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-constexpr int64_t kStartNs = 1'700'000'000'000'000'000, kPeriodNs = 33'333'333;
-
-// The real disk, until a test makes it slow or full.
-class TestDisk : public RecordingDisk {
- public:
-  std::unique_ptr<RecordingFile> create(const fs::path& file) override {
-    pass(file);
-    return std::make_unique<File>(*this, file, disk_->create(file));
-  }
-  double bytes_left(const fs::path&) override { return left; }
-
-  // From now on nobody gets by, until resume().
-  void stall() { set_stalled(true); }
-  void resume() { set_stalled(false); }
-  // Until somebody stands there.
-  void wait_for_a_stalled_one() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return waiting_ > 0; });
-  }
-
-  std::atomic<bool> full = false;
-  std::atomic<double> left = 1e12;
-  std::atomic<int> refused = 0;
-
- private:
-  class File : public RecordingFile {
-   public:
-    File(TestDisk& disk, fs::path path, std::unique_ptr<RecordingFile> file)
-        : disk_(disk), path_(std::move(path)), file_(std::move(file)) {}
-    void append(std::string_view bytes) override {
-      disk_.pass(path_);
-      file_->append(bytes);
-    }
-
-   private:
-    TestDisk& disk_;
-    fs::path path_;
-    std::unique_ptr<RecordingFile> file_;
-  };
-
-  void pass(const fs::path& file) {
-    std::unique_lock lock(mutex_);
-    ++waiting_;
-    changed_.notify_all();
-    changed_.wait(lock, [&] { return !stalled_; });
-    --waiting_;
-    if (!full) return;
-    ++refused;
-    throw std::runtime_error(file.string() + ": cannot be written: No space left on device");
-  }
-  void set_stalled(bool stalled) {
-    const std::lock_guard lock(mutex_);
-    stalled_ = stalled;
-    changed_.notify_all();
-  }
-
-  std::shared_ptr<RecordingDisk> disk_ = real_disk();
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool stalled_ = false;
-  int waiting_ = 0;
-};
-
-// Waits for what another thread does soon; a test that waits in vain fails by what it checks next.
-template <typename Condition>
-void wait_until(Condition condition) {
-  for (int i = 0; i < 10'000 && !condition(); ++i) std::this_thread::sleep_for(1ms);
-}
-
-class Recording : public testing::Test {
- protected:
-  Recording() { options.folder = folder_ / "flights", options.disk = disk_; }
-
-  std::unique_ptr<FlightRecorder> recorder() const {
-    return std::make_unique<FlightRecorder>(options, camera, "target: pad.yaml\n", mount, 30);
-  }
-  // The i-th of a run: every number another.
-  Frame frame(int i) {
-    Frame f;
-    f.timestamp_ns = kStartNs + i * kPeriodNs;
-    f.grey.create(camera.height(), camera.width(), CV_8UC1);
-    for (int y = 0; y < f.grey.rows; ++y) {
-      for (int x = 0; x < f.grey.cols; ++x) f.grey.at<uint8_t>(y, x) = static_cast<uint8_t>(rng.bits());
-    }
-    return f;
-  }
-  static Estimator::Aid aid(int i) {
-    Estimator::Aid a;
-    a.angles = HeadAngles{0.1 * i, 1.0 / (i + 3)};
-    a.world_from_body = Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5);
-    a.autopilot.resize(2);
-    a.autopilot[1].timestamp_ns = kStartNs + i;
-    return a;
-  }
-  static Estimate estimate(int i) {
-    Estimate e;
-    e.timestamp_ns = kStartNs + i * kPeriodNs;
-    e.status = EstimateStatus::kOk;
-    e.camera_from_target.mean.translation = {1.0 / 3, 0.1 * i, 5};
-    e.state.emplace().timestamp_ns = e.timestamp_ns;
-    return e;
-  }
-  bool add(FlightRecorder& r, int i) { return r.add_frame(frame(i), aid(i), estimate(i)); }
-
-  TempFolder folder_;
-  std::shared_ptr<TestDisk> disk_ = std::make_shared<TestDisk>();
-  RecorderOptions options;
-  CameraModel camera{
-      "LENSMODEL_OPENCV8", {50.1, 50.2, 31.3, 23.7, 0.1, 0.01, 1e-3, 1.0 / 3, 0.1, 0.2, 0.3, 0.4}, 64, 48};
-  std::optional<Rigid3> mount = Rigid3{Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {0.1, 0.2, 0.3}};
-  TestRng rng;
-};
-
-// All of a flight's folder, as its readers see it.
-struct Recorded {
-  explicit Recorded(const fs::path& folder) : flight(read_flight(folder)) {
-    problems = flight.problems;
-    const auto source = open_image_source("flight:" + folder.string());
-    for (Frame f; source->next(f);) frames.push_back(f);
-    problems.insert(problems.end(), source->problems().begin(), source->problems().end());
-    aids = read_aids(folder / "run/aids.csv", problems);
-    estimates = read_estimates(folder / "run/estimates.csv", problems, LastLine::kMustEnd);
-    states = read_states(folder / "run/states.csv", problems, LastLine::kMustEnd);
-    for (const Frame& f : frames) {
-      if (!f.problem.empty()) problems.push_back(f.problem);
-    }
-  }
-  Flight flight;
-  std::vector<Frame> frames;
-  std::vector<FrameAid> aids;
-  std::vector<Estimate> estimates;
-  std::vector<VehicleState> states;
-  std::vector<std::string> problems;
-};
 
 TEST_F(Recording, IsAFlightThatReadsBackAlike) {
   auto r = recorder();
@@ -378,6 +230,16 @@ TEST_F(Recording, AStalledDiskCostsPicturesAndDelaysNobody) {
   EXPECT_EQ(recorded.aids.size(), 2u * kFrames);
 }
 
+TEST_F(Recording, KeepsTheLogAndIsBroughtToTheDiskWhileItGoesOn) {
+  auto r = recorder();
+  r->add_log("I live_run.cc:1] first");
+  r->add_log("I live_run.cc:2] second");
+  wait_until([&] { return disk_->synced >= 1; });
+  EXPECT_GE(disk_->synced, 1);
+  r->close();
+  EXPECT_EQ(read_file(r->folder() / "run/log"), "I live_run.cc:1] first\nI live_run.cc:2] second\n");
+}
+
 TEST_F(Recording, TakesNoMoreMemoryThanItsQueues) {
   auto r = recorder();
   disk_->stall();
@@ -431,87 +293,6 @@ TEST_F(Recording, LeavesTheRestOfTheDiskToOthers) {
   const Recorded recorded(r->folder());
   EXPECT_EQ(recorded.frames.size(), 1u);
   EXPECT_EQ(recorded.estimates.size(), 2u);
-}
-
-// What a child has told its parent so far.
-struct Progress {
-  std::atomic<int> frames, pictures;
-};
-
-TEST_F(Recording, KilledAtAnyMomentItLosesASecondAtMost) {
-  constexpr int kRounds = 5, kAtATime = 4;
-  options.disk = real_disk();
-  auto* progress = static_cast<Progress*>(
-      mmap(nullptr, kAtATime * sizeof(Progress), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
-  ASSERT_NE(progress, MAP_FAILED);
-  for (int round = 0; round < kRounds; ++round) {
-    options.format = round % 2 == 0 ? "png" : "ffv1";
-    std::vector<pid_t> children;
-    std::vector<fs::path> folders;
-    for (int c = 0; c < kAtATime; ++c) {
-      options.folder = folder_ / ("round" + std::to_string(round) + "_" + std::to_string(c));
-      folders.push_back(options.folder);
-      progress[c].frames = progress[c].pictures = 0;
-      const pid_t child = fork();
-      if (child == 0) {
-        const auto r = recorder();
-        const Frame one = frame(0);
-        for (int i = 0;; ++i) {
-          Frame f = one;
-          f.timestamp_ns += i * kPeriodNs;
-          if (r->add_frame(f, aid(i), estimate(i))) ++progress[c].pictures;
-          ++progress[c].frames;
-          std::this_thread::sleep_for(1ms);
-        }
-      }
-      ASSERT_GT(child, 0);
-      children.push_back(child);
-    }
-    std::this_thread::sleep_for(std::chrono::microseconds(100'000 + rng.bits() % 300'000));
-    std::vector<std::pair<int, int>> a_second_ago;
-    for (int c = 0; c < kAtATime; ++c) a_second_ago.emplace_back(progress[c].frames, progress[c].pictures);
-    std::this_thread::sleep_for(1s);
-    for (const pid_t child : children) {
-      kill(child, SIGKILL);
-      std::this_thread::sleep_for(std::chrono::microseconds(rng.bits() % 10'000));
-    }
-    for (const pid_t child : children) waitpid(child, nullptr, 0);
-    for (size_t c = 0; c < kAtATime; ++c) {
-      const Recorded recorded(fs::directory_iterator(folders[c])->path());
-      const auto [frames, pictures] = a_second_ago[c];
-      EXPECT_GT(pictures, 0);
-      EXPECT_GE(recorded.frames.size(), static_cast<size_t>(pictures));
-      EXPECT_GE(recorded.aids.size(), static_cast<size_t>(frames));
-      EXPECT_GE(recorded.estimates.size(), static_cast<size_t>(frames));
-      EXPECT_GE(recorded.states.size(), static_cast<size_t>(frames));
-      // A row that was cut off at most, in each of the files; every picture that has a row is whole.
-      EXPECT_LE(recorded.problems.size(), 4u) << testing::PrintToString(recorded.problems);
-      for (const std::string& problem : recorded.problems) EXPECT_THAT(problem, HasSubstr("cut off"));
-    }
-  }
-  munmap(progress, kAtATime * sizeof(Progress));
-}
-
-TEST_F(Recording, CutOffAnywhereItsTablesKeepWhatIsWhole) {
-  auto r = recorder();
-  for (int i = 0; i < 3; ++i) {
-    ASSERT_TRUE(add(*r, i));
-    r->add_navigation({kStartNs + i, {}, {1.25, 2.5, 3.125}});
-  }
-  r->close();
-  const fs::path flight = r->folder();
-  for (const char* name : {"mav0/cam0/data.csv", "mav0/nav0/data.csv", "mav0/gimbal0/data.csv",
-                           "run/estimates.csv", "run/states.csv"}) {
-    const std::string whole = read_file(flight / name);
-    for (size_t cut = 1; whole[whole.size() - cut - 1] != '\n'; ++cut) {
-      std::ofstream(flight / name, std::ios::binary) << whole.substr(0, whole.size() - cut);
-      const Recorded recorded(flight);
-      ASSERT_EQ(recorded.problems.size(), 1u) << name << " less " << cut;
-      EXPECT_THAT(recorded.problems[0],
-                  EndsWith(std::string(name) + ":4: the file was cut off within this row, row skipped"));
-    }
-    std::ofstream(flight / name, std::ios::binary) << whole;
-  }
 }
 
 }  // namespace

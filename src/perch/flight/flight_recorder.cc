@@ -26,6 +26,7 @@ constexpr size_t kMostWaiting = 16'000'000;
 // A kill costs what is not with the kernel yet: a second at most, with room for a slow disk.
 constexpr auto kWriteEvery = 200ms;
 constexpr auto kLookAtDiskEvery = 1s;
+constexpr auto kSyncEvery = 1s;
 
 constexpr char kNavHeader[] =
     "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z,v_x [m/s],v_y [m/s],v_z [m/s]\n";
@@ -87,14 +88,15 @@ struct FlightRecorder::Logs {
         aids(disk, flight / "run" / "aids.csv", aids_header(), kMostWaiting),
         events(disk, flight / "run" / "events.csv", kEventsHeader, kMostWaiting),
         mavlink(disk, flight / "run" / "mavlink.tlog", "", kMostWaiting),
+        log(disk, flight / "run" / "log", "", kMostWaiting),
         nav(disk, flight / "mav0" / "nav0" / "data.csv", kNavHeader, kMostWaiting),
         gimbal(disk, flight / "mav0" / "gimbal0" / "data.csv", kGimbalHeader, kMostWaiting) {
-    for (AppendLog* log : {&estimates, &states, &aids, &events}) log->create();
+    for (AppendLog* table : {&estimates, &states, &aids, &events}) table->create();
   }
 
-  AppendLog estimates, states, aids, events, mavlink;
+  AppendLog estimates, states, aids, events, mavlink, log;
   AppendLog nav, gimbal;  // made with their first row: without any the flight has neither
-  std::array<AppendLog*, 7> all{&aids, &estimates, &states, &events, &mavlink, &nav, &gimbal};
+  std::array<AppendLog*, 8> all{&aids, &estimates, &states, &events, &mavlink, &log, &nav, &gimbal};
 
   std::mutex link_mutex;  // of what follows
   TlogFramer in, out;
@@ -133,6 +135,7 @@ FlightRecorder::FlightRecorder(const RecorderOptions& options, const CameraModel
                                       : ffv1_sink(disk, cam0, {camera.width(), camera.height()}, rate_hz);
   pictures_ = std::make_unique<PictureRecorder>(std::move(pictures), std::move(sink));
   thread_ = std::thread([this] { run(); });
+  sync_thread_ = std::thread([this] { keep_on_disk(); });
 }
 
 FlightRecorder::~FlightRecorder() { close(); }
@@ -160,8 +163,9 @@ void FlightRecorder::close() noexcept {
     const std::lock_guard lock(stop_mutex_);
     stop_ = true;
   }
-  stopped_.notify_one();
+  stopped_.notify_all();
   thread_.join();
+  sync_thread_.join();
 }
 
 void FlightRecorder::add_rows(const Frame& frame, const Estimator::Aid& aid, const Estimate& estimate) {
@@ -211,6 +215,14 @@ void FlightRecorder::add_navigation(const NavSample& sample) noexcept {
 void FlightRecorder::add_event(int64_t timestamp_ns, std::string_view what) noexcept {
   try {
     if (closed_ || !logs_->events.add(event_row(timestamp_ns, what))) ++rows_dropped_;
+  } catch (const std::exception&) {
+    ++rows_dropped_;
+  }
+}
+
+void FlightRecorder::add_log(std::string_view line) noexcept {
+  try {
+    if (closed_ || !logs_->log.add(std::string(line) + '\n')) ++rows_dropped_;
   } catch (const std::exception&) {
     ++rows_dropped_;
   }
@@ -279,6 +291,21 @@ void FlightRecorder::run() {
   }
   lock.unlock();
   write_logs();
+}
+
+// A thread of its own: a slow disk takes seconds, in which the tables go on to the kernel.
+void FlightRecorder::keep_on_disk() {
+  work_in_background();
+  std::unique_lock lock(stop_mutex_);
+  while (!stopped_.wait_for(lock, kSyncEvery, [&] { return stop_; })) {
+    lock.unlock();
+    try {
+      options_.disk->sync(folder_);
+    } catch (const std::exception& e) {
+      complain(e.what());
+    }
+    lock.lock();
+  }
 }
 
 }  // namespace perch

@@ -39,9 +39,11 @@ struct RecorderOptions {
 //   add_frame --> pictures, queue_frames of them --> cam0
 //            '--> rows, some MB of them -----------> run/*.csv, nav0, gimbal0, at least every 0.2 s
 //   add_bytes --> MAVLink frames, some MB ---------> run/mavlink.tlog
+//   add_log ----> lines, some MB ------------------> run/log
 //
 // Everything that was written is whole and in the kernel's hands, so that kill -9 costs the last second at
-// most.
+// most. Every second a thread has the kernel bring it to the disk, so that a loss of power costs the last
+// two, or what the disk takes longer.
 //
 // A replay is bit-exact when the resolved configuration says all that the estimator used. Where the mount
 // (frames.body_from_base) came from the source of the pictures, put it into the configuration (as an
@@ -80,6 +82,8 @@ class FlightRecorder {
   void add_bytes(Direction direction, int64_t monotonic_ns, std::span<const uint8_t> bytes) noexcept;
   // A row of run/events.csv; what is to be said in one line. On the camera's clock.
   void add_event(int64_t timestamp_ns, std::string_view what) noexcept;
+  // A line of the program's log, without its end.
+  void add_log(std::string_view line) noexcept;
 
   // Writes everything that was accepted, unless the disk refuses it, and waits for that; nothing is accepted
   // any more. For those who want the counters of the whole.
@@ -95,6 +99,7 @@ class FlightRecorder {
   void add_rows(const Frame& frame, const Estimator::Aid& aid, const Estimate& estimate);
   void run();
   void write_logs();
+  void keep_on_disk();
 
   const RecorderOptions options_;
   std::filesystem::path folder_;
@@ -112,7 +117,7 @@ class FlightRecorder {
   std::mutex stop_mutex_;
   std::condition_variable stopped_;
   bool stop_ = false;
-  std::thread thread_;
+  std::thread thread_, sync_thread_;
 };
 
 }  // namespace perch

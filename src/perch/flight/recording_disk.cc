@@ -69,6 +69,17 @@ class RealDisk : public RecordingDisk {
     const auto space = fs::space(folder, error);
     return error ? std::numeric_limits<double>::infinity() : static_cast<double>(space.available);
   }
+  // Of the whole file system at once: pictures are many files, and their folder's entries count as well.
+  void sync(const fs::path& folder) override {
+    const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const bool good = descriptor >= 0 && syncfs(descriptor) == 0;
+    const int error = errno;
+    if (descriptor >= 0) close(descriptor);
+    if (!good) {
+      throw std::runtime_error(folder.string() +
+                               ": cannot be synchronised: " + std::generic_category().message(error));
+    }
+  }
 };
 
 }  // namespace

@@ -24,6 +24,9 @@ class RecordingDisk {
   virtual std::unique_ptr<RecordingFile> create(const std::filesystem::path& file) = 0;
   // What is left for files of ours, in bytes; empty space nobody knows of counts as plenty.
   virtual double bytes_left(const std::filesystem::path& folder) = 0;
+  // Waits until all that was written is on the disk under this folder, so that a loss of power leaves it.
+  // Throws std::runtime_error.
+  virtual void sync(const std::filesystem::path& folder) = 0;
 };
 
 std::shared_ptr<RecordingDisk> real_disk();

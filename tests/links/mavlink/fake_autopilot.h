@@ -43,6 +43,7 @@ class FakeAutopilot {
   double delay_ms = 2, jitter_ms = 2;  // exponential, of each message on its own; their order is kept
   double loss = 0;                     // both ways
   bool silent = false;
+  bool datagrams = true;  // else what it hears is a stream, cut anywhere
   int deaf_requests = 0;  // so many intervals asked for are ignored
   std::map<std::string, double> parameters = {{"PLND_ENABLED", 1}, {"PLND_TYPE", 1}, {"PLND_LAG", 0.0625}};
   std::set<uint32_t> unsupported;
@@ -73,7 +74,9 @@ class FakeAutopilot {
   template <class HandOver>
   void step(int64_t now_ns, const HandOver& hand_over) {
     while (!incoming_.empty() && incoming_.front().due_ns <= now_ns) {
-      parser_.parse_datagram(incoming_.front().bytes, [&](const Frame& frame) { handle(frame, now_ns); });
+      const auto hear = [&](const Frame& frame) { handle(frame, now_ns); };
+      const auto& bytes = incoming_.front().bytes;
+      datagrams ? parser_.parse_datagram(bytes, hear) : parser_.parse(bytes, hear);
       incoming_.pop_front();
     }
     if (!silent) {

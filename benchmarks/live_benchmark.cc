@@ -1,0 +1,164 @@
+// perch_live_benchmark: perch-live as a whole, 640x480 at 30 Hz with raw pictures and an autopilot that
+// streams over UDP: from exposure to bytes out, and the processor time of each thread; with and without
+// recording, on an idle machine and beside a program that keeps every core busy. See benchmarks/README.md.
+//
+//   perch_live_benchmark SECONDS [row]
+
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <atomic>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "apps/real_time_autopilot.h"
+#include "perch/flight/sensor_file.h"
+#include "perch/simulation/simulation.h"
+#include "support/temp_folder.h"
+
+namespace perch {
+namespace {
+
+using nlohmann::json;
+constexpr int kRate = 30;
+constexpr int kPictures = 60;  // rendered; played to and fro
+
+struct Row {
+  std::string name;
+  bool busy = false;   // every core has another program on it
+  std::string record;  // "", png, ffv1
+  bool slow_disk = false;
+};
+
+Simulation simulation() {
+  const std::string source = PERCH_SOURCE_DIR;
+  return read_simulation(
+      Section::parse("target: " + source +
+                         "/configs/targets/sharp.yaml\n"
+                         "flight: {start_height: 5, start_aside: 0.5, touchdown_height: 2.5, "
+                         "duration: 4, hover: 10}\n",
+                     source + "/sim.yaml"));
+}
+
+// Raw grey pictures, one after the other, for as long as a run takes: what a camera's driver would give.
+void write_film(const SimulatedFlight& flight, const std::string& file, int seconds) {
+  std::vector<cv::Mat> pictures;
+  for (int i = 0; i < kPictures; ++i) pictures.push_back(flight.picture(kRate + i));
+  std::ofstream film(file, std::ios::binary);
+  for (int i = 0; i < (seconds + 1) * kRate; ++i) {
+    const int at = i % (2 * kPictures - 2);
+    cv::Mat picture = pictures[static_cast<size_t>(at < kPictures ? at : 2 * kPictures - 2 - at)].clone();
+    // A sensor's noise never repeats itself; a picture that does is not believed.
+    picture.at<uint8_t>(0, 0) = static_cast<uint8_t>(i);
+    film.write(picture.ptr<char>(), static_cast<std::streamsize>(picture.total()));
+  }
+}
+
+pid_t start(const std::string& folder, std::vector<std::string> arguments, const std::string& preload) {
+  const pid_t child = fork();
+  if (child != 0) return child;
+  if (!preload.empty()) setenv("LD_PRELOAD", preload.c_str(), 1);
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  if (chdir(folder.c_str()) != 0 || !freopen("log", "a", stderr)) _exit(126);
+  execv(argv[0], argv.data());
+  _exit(127);
+}
+
+// One for each core: an endless sum.
+std::vector<pid_t> keep_cores_busy() {
+  std::vector<pid_t> busy;
+  for (unsigned i = 0; i < std::thread::hardware_concurrency(); ++i) {
+    const pid_t child = fork();
+    if (child == 0) {
+      for (std::atomic<uint64_t> sum = 0;;) ++sum;
+    }
+    busy.push_back(child);
+  }
+  return busy;
+}
+
+json run(const Row& row, const TempFolder& folder, int seconds) {
+  mavlink::RealTimeAutopilot autopilot;
+  const std::string film = folder / "film.raw";
+  std::vector<std::string> arguments = {PERCH_LIVE,
+                                        "--config",
+                                        "run.yaml",
+                                        "--summary",
+                                        "summary.json",
+                                        "--duration",
+                                        std::to_string(seconds),
+                                        "--set",
+                                        "nav=" + autopilot.url()};
+  if (!row.record.empty()) {
+    arguments.insert(arguments.end(), {"--set", "outputs.record.folder=flights", "--set",
+                                       "outputs.record.format=" + row.record});
+  }
+  const auto busy = row.busy ? keep_cores_busy() : std::vector<pid_t>{};
+  waitpid(start(folder.path().string(), arguments, row.slow_disk ? PERCH_SLOW_DISK : ""), nullptr, 0);
+  for (const pid_t child : busy) kill(child, SIGKILL), waitpid(child, nullptr, 0);
+  json summary = json::parse(read_file(folder / "summary.json"));
+  summary["landing_targets"] = autopilot.landing_targets().size();
+  return summary;
+}
+
+void print(const Row& row, const json& summary) {
+  const auto latency = [&](const char* stage) {
+    const json& l = summary["latency_us"][stage];
+    char text[64];
+    std::snprintf(text, sizeof(text), "%.2f / %.2f / %.1f", l["median"].get<double>() * 1e-3,
+                  l["p99"].get<double>() * 1e-3, l["worst"].get<double>() * 1e-3);
+    return std::string(text);
+  };
+  const double seconds = summary["seconds"];
+  const auto percent = [&](const char* thread) {
+    return 100 * summary["cpu_s"][thread].get<double>() / seconds;
+  };
+  std::printf("| %s | %s | %s | %s | %.1f | %.1f | %.1f | %.1f | %lld of %lld | %lld |\n", row.name.c_str(),
+              latency("waiting").c_str(), latency("estimate").c_str(), latency("total").c_str(),
+              percent("process"), percent("capture"), percent("estimator"), percent("link"),
+              static_cast<long long>(summary["landing_targets"]), static_cast<long long>(summary["frames"]),
+              row.record.empty() ? 0LL : static_cast<long long>(summary["recording"]["frames_dropped"]));
+  std::fflush(stdout);
+}
+
+int benchmark(int seconds, const std::string& only) {
+  const TempFolder folder;
+  const SimulatedFlight flight(simulation());
+  write_film(flight, folder / "film.raw", seconds);
+  folder.write("camera.cameramodel", camera_model_text(flight.simulation().camera));
+  folder.write("run.yaml", "target: " PERCH_SOURCE_DIR
+                           "/configs/targets/sharp.yaml\n"
+                           "camera:\n"
+                           "  model: camera.cameramodel\n"
+                           "  source: 'gst:filesrc location=" +
+                               (folder / "film.raw").string() +
+                               " ! rawvideoparse format=gray8 width=640 height=480 framerate=30/1'\n"
+                               "frames: {body_from_base: identity}\n"
+                               "outputs: {mavlink: {}}\n");
+  std::puts(
+      "| | waiting, ms | estimate, ms | exposure to sent, ms | CPU % of a core | capture | estimator | link "
+      "| "
+      "sent of frames | pictures not recorded |\n|---|---|---|---|---|---|---|---|---|---|");
+  for (const Row& row :
+       {Row{"idle", false, "", false}, Row{"recording png", false, "png", false},
+        Row{"recording ffv1", false, "ffv1", false}, Row{"recording png, slow disk", false, "png", true},
+        Row{"all cores busy", true, "", false}, Row{"all cores busy, recording png", true, "png", false}}) {
+    if (only.empty() || row.name == only) print(row, run(row, folder, seconds));
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace perch
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::cerr << "usage: perch_live_benchmark SECONDS [ROW]\n";
+    return 2;
+  }
+  return perch::benchmark(std::atoi(argv[1]), argc > 2 ? argv[2] : "");
+}

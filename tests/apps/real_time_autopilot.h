@@ -1,0 +1,249 @@
+#pragma once
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "links/mavlink/fake_autopilot.h"
+#include "perch/links/byte_stream.h"
+
+namespace perch::mavlink {
+
+// The autopilot's end of a link of this machine. Nothing waits.
+class Wire {
+ public:
+  virtual ~Wire() = default;
+  virtual std::string url() const = 0;
+  virtual int descriptor() const = 0;  // readable: something may have come
+  virtual size_t read(std::span<uint8_t> buffer) = 0;
+  virtual void write(std::span<const uint8_t> bytes) = 0;
+  virtual bool datagrams() const { return false; }
+};
+
+// A socket at a free port of the loopback interface.
+class LoopbackSocket {
+ public:
+  explicit LoopbackSocket(int type) : fd(socket(AF_INET, type, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+    socklen_t size = sizeof(address);
+    getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
+    place = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  }
+  ~LoopbackSocket() { close(fd); }
+  LoopbackSocket(const LoopbackSocket&) = delete;
+  LoopbackSocket& operator=(const LoopbackSocket&) = delete;
+
+  int fd;
+  std::string place;
+};
+
+class UdpWire : public Wire {
+ public:
+  std::string url() const override { return "mavlink+udp://" + socket_.place; }
+  int descriptor() const override { return socket_.fd; }
+  size_t read(std::span<uint8_t> buffer) override {
+    sockaddr_in from{};
+    socklen_t size = sizeof(from);
+    const ssize_t got = recvfrom(socket_.fd, buffer.data(), buffer.size(), MSG_DONTWAIT,
+                                 reinterpret_cast<sockaddr*>(&from), &size);
+    if (got > 0) peer_ = from;
+    return got > 0 ? static_cast<size_t>(got) : 0;
+  }
+  void write(std::span<const uint8_t> bytes) override {
+    if (peer_.sin_port == 0) return;
+    (void)sendto(socket_.fd, bytes.data(), bytes.size(), MSG_DONTWAIT,
+                 reinterpret_cast<const sockaddr*>(&peer_), sizeof(peer_));
+  }
+  bool datagrams() const override { return true; }
+
+ private:
+  LoopbackSocket socket_{SOCK_DGRAM};
+  sockaddr_in peer_{};  // whoever spoke to us last
+};
+
+// One client, as SITL serves them.
+class TcpWire : public Wire {
+ public:
+  TcpWire() { EXPECT_EQ(listen(socket_.fd, 1), 0); }
+  ~TcpWire() override {
+    if (client_ >= 0) close(client_);
+  }
+  std::string url() const override { return "mavlink+tcp://" + socket_.place; }
+  int descriptor() const override { return client_ < 0 ? socket_.fd : client_; }
+  size_t read(std::span<uint8_t> buffer) override {
+    if (client_ < 0) {
+      client_ = accept4(socket_.fd, nullptr, nullptr, SOCK_NONBLOCK);
+      const int yes = 1;
+      setsockopt(client_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
+      return 0;
+    }
+    const ssize_t got = recv(client_, buffer.data(), buffer.size(), 0);
+    if (got == 0) hang_up();
+    return got > 0 ? static_cast<size_t>(got) : 0;
+  }
+  void write(std::span<const uint8_t> bytes) override {
+    if (client_ >= 0) (void)send(client_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  }
+
+ private:
+  void hang_up() {
+    close(client_);
+    client_ = -1;
+  }
+  LoopbackSocket socket_{SOCK_STREAM};
+  int client_ = -1;
+};
+
+// A serial line: the other end of a pseudo-terminal. Reading gets what is there, cut anywhere.
+class PtyWire : public Wire {
+ public:
+  PtyWire() : fd_(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+    EXPECT_EQ(grantpt(fd_), 0);
+    EXPECT_EQ(unlockpt(fd_), 0);
+    std::array<char, 64> name{};
+    EXPECT_EQ(ptsname_r(fd_, name.data(), name.size()), 0);
+    device_ = name.data();
+    line_ = open(device_.c_str(), O_RDWR | O_NOCTTY);  // held open, or reading fails until somebody comes
+    termios raw{};
+    tcgetattr(line_, &raw);
+    cfmakeraw(&raw);
+    tcsetattr(line_, TCSANOW, &raw);
+  }
+  ~PtyWire() override {
+    close(line_);
+    close(fd_);
+  }
+  std::string url() const override { return "mavlink+serial://" + device_ + "?baud=921600"; }
+  int descriptor() const override { return fd_; }
+  size_t read(std::span<uint8_t> buffer) override {
+    const ssize_t got = ::read(fd_, buffer.data(), buffer.size());
+    heard_ = heard_ || got > 0;
+    return got > 0 ? static_cast<size_t>(got) : 0;
+  }
+  // A line keeps nothing for somebody who comes later, as a pseudo-terminal would.
+  void write(std::span<const uint8_t> bytes) override {
+    if (heard_) (void)!::write(fd_, bytes.data(), bytes.size());
+  }
+
+ private:
+  int fd_, line_ = -1;
+  bool heard_ = false;
+  std::string device_;
+};
+
+// The fake autopilot in real time, at the other end of a wire: a thread of its own, a millisecond a step.
+class RealTimeAutopilot {
+ public:
+  template <class Message>
+  struct Arrival {
+    int64_t arrived_ns = 0;  // CLOCK_MONOTONIC
+    Message target;
+  };
+
+  explicit RealTimeAutopilot(std::unique_ptr<Wire> wire = std::make_unique<UdpWire>(),
+                             std::unique_ptr<Signing> signing = nullptr)
+      : wire_(std::move(wire)), signing_(std::move(signing)), autopilot_(0, signing_.get()) {
+    autopilot_.booted_ns = monotonic_ns() - 500 * kSecond;
+    autopilot_.datagrams = wire_->datagrams();
+    thread_ = std::thread([this] { run(); });
+  }
+  ~RealTimeAutopilot() {
+    stop_ = true;
+    thread_.join();
+  }
+
+  std::string url() const { return wire_->url(); }
+
+  // Looks at the autopilot, or changes it, between two steps.
+  template <class Work>
+  auto with(const Work& work) {
+    const std::lock_guard lock(mutex_);
+    return work(autopilot_);
+  }
+  std::vector<Arrival<LandingTarget>> landing_targets() const {
+    const std::lock_guard lock(mutex_);
+    return landing_targets_;
+  }
+  std::vector<Arrival<TargetRelative>> relative_targets() const {
+    const std::lock_guard lock(mutex_);
+    return relative_targets_;
+  }
+  size_t unsigned_frames() const {
+    const std::lock_guard lock(mutex_);
+    return unsigned_;
+  }
+  // Any bytes, as they are.
+  void send_raw(const std::vector<uint8_t>& bytes) {
+    const std::lock_guard lock(mutex_);
+    wire_->write(bytes);
+  }
+  // Of every so many frames the second half is lost, as a serial port that overruns does; 0: none.
+  void cut_every(int frames) {
+    const std::lock_guard lock(mutex_);
+    cut_every_ = frames;
+  }
+
+ private:
+  void run() {
+    std::vector<uint8_t> buffer(2048);
+    while (!stop_) {
+      pollfd waiting{wire_->descriptor(), POLLIN, 0};
+      const bool readable = poll(&waiting, 1, 1) > 0;
+      const std::lock_guard lock(mutex_);
+      if (readable) {
+        const auto bytes = std::span(buffer).first(wire_->read(buffer));
+        autopilot_.receive(bytes, monotonic_ns());
+        note_targets(bytes);
+      }
+      autopilot_.step(monotonic_ns(), [&](const std::vector<uint8_t>& bytes, int64_t) {
+        const bool cut = cut_every_ > 0 && ++frames_ % cut_every_ == 0;
+        wire_->write(std::span(bytes).first(cut ? bytes.size() / 2 : bytes.size()));
+      });
+    }
+  }
+
+  // With the time at which they really came: the fake autopilot hears everything later.
+  void note_targets(std::span<const uint8_t> bytes) {
+    const int64_t now_ns = monotonic_ns();
+    const auto note = [&](const Frame& frame) {
+      if (const auto m = decode<LandingTarget>(frame)) landing_targets_.push_back({now_ns, *m});
+      if (const auto m = decode<TargetRelative>(frame)) relative_targets_.push_back({now_ns, *m});
+      unsigned_ += !frame.is_signed;
+    };
+    wire_->datagrams() ? parser_.parse_datagram(bytes, note) : parser_.parse(bytes, note);
+  }
+
+  std::unique_ptr<Wire> wire_;
+  std::unique_ptr<Signing> signing_;
+  mutable std::mutex mutex_;  // of what follows, and of the wire's reading and writing
+  FakeAutopilot autopilot_;
+  FrameParser parser_;
+  std::vector<Arrival<LandingTarget>> landing_targets_;
+  std::vector<Arrival<TargetRelative>> relative_targets_;
+  size_t unsigned_ = 0;
+  int cut_every_ = 0;
+  uint64_t frames_ = 0;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;
+};
+
+}  // namespace perch::mavlink
