@@ -50,6 +50,7 @@ LiveConfig read_live_config(Section root) {
   read_nav(root, config);
   Section outputs = root.section("outputs");
   config.mavlink = mavlink::read_mavlink_options(outputs);
+  config.mavlink.link.gimbal = config.run.frames.pan_tilt.has_value();
   read_record(outputs, config);
   if (is_replay(config)) {
     // What was seen then must not steer a vehicle now, and is recorded already.

@@ -46,6 +46,7 @@ LiveLink::LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap)
     : latency_(latency),
       tap_(std::move(tap)),
       sends_(config.mavlink.send),
+      frames_(config.run.frames),
       time_offset_ns_(-navigation_time_ns(config.run.frames, 0)),
       stream_(*config.autopilot),
       signing_(config.mavlink.signing ? std::make_unique<mavlink::Signing>(*config.mavlink.signing,
@@ -167,6 +168,7 @@ Estimator::Aid LiveLink::aid_at(int64_t camera_time_ns) {
   Estimator::Aid aid;
   aid.autopilot = feed_.take(link_.history());
   aid.world_from_body = feed_.attitude_at(link_.history(), camera_time_ns);
+  if (frames_.pan_tilt) aid.angles = feed_.head_angles_at(link_.history(), frames_, camera_time_ns);
   return aid;
 }
 

@@ -80,6 +80,7 @@ class LiveLink {
   LiveLatency& latency_;
   const LinkTap tap_;
   const bool sends_;
+  const FrameChain frames_;
   const int64_t time_offset_ns_;
   ByteStream stream_;
 

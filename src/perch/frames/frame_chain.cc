@@ -36,6 +36,26 @@ Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>
   return chain.pan_tilt->base_from_zero * Rigid3{pan * tilt, Eigen::Vector3d::Zero()};
 }
 
+std::optional<HeadAngles> head_angles_of(const FrameChain& chain,
+                                         const Eigen::Quaterniond& body_from_camera) {
+  if (!chain.pan_tilt || !body_from_camera.coeffs().allFinite()) return std::nullopt;
+  // What a head that is stiff and level may be off; five metres away it is 17 cm.
+  constexpr double kMostLeft = 2 * kRadFromDeg;
+  const Eigen::Quaterniond body_from_base =
+      chain.body_from_base ? chain.body_from_base->rotation : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond turned =
+      (body_from_base * chain.pan_tilt->base_from_zero.rotation).conjugate() * body_from_camera;
+  const Eigen::Matrix3d R = turned.toRotationMatrix();  // Ry(pan) Rx(tilt)
+  HeadAngles angles;
+  angles.pan = std::atan2(-R(2, 0), R(0, 0));
+  const Eigen::Quaterniond pan(Eigen::AngleAxisd(angles.pan, Eigen::Vector3d::UnitY()));
+  const Eigen::Matrix3d rest = (pan.conjugate() * turned).toRotationMatrix();
+  angles.tilt = std::atan2(rest(2, 1), rest(1, 1));
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(angles.tilt, Eigen::Vector3d::UnitX()));
+  if (!((pan * tilt).angularDistance(turned) < kMostLeft)) return std::nullopt;
+  return angles;
+}
+
 namespace {
 
 Rigid3 camera_from_body(const FrameChain& chain, const std::optional<HeadAngles>& angles) {

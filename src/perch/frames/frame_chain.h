@@ -43,6 +43,15 @@ FrameChain read_frame_chain(Section frames);
 // g_dc at these angles; a fixed camera's does not ask for them.
 Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>& angles);
 
+// The angles at which the head holds a camera that is turned so in the body (camera axes); empty where no two
+// angles do: a third axis keeps the horizon level, or base_from_zero is another head's.
+std::optional<HeadAngles> head_angles_of(const FrameChain& chain, const Eigen::Quaterniond& body_from_camera);
+
+// A head turns the camera, and nobody knows how far: where the body is does not follow from the picture.
+inline bool head_is_unknown(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
+  return chain.pan_tilt && !angles;
+}
+
 // What vision says: the pose of the body in the pad frame, with the covariance of the camera's pose. A
 // missing body_from_base counts as the identity.
 UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,

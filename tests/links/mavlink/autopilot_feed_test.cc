@@ -80,5 +80,49 @@ TEST(AutopilotFeed, ACameraClockThatIsOffIsAllowedFor) {
   EXPECT_FALSE(feed.attitude_at(history, 1020 * kMs));
 }
 
+// A head under a vehicle that banks and turns: what the gimbal says against heading and horizon gives the
+// angles that the chain turns the camera by.
+TEST(AutopilotFeed, AGimbalsAttitudeIsTheHeadsAngles) {
+  FrameChain chain;
+  chain.pan_tilt = PanTilt{};
+  Eigen::Matrix3d frd_from_camera;
+  frd_from_camera << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  chain.body_from_base.emplace().rotation =
+      Eigen::Quaterniond(frd_from_camera) * so3_exp({0.02, -0.03, 0.01});
+  const AutopilotFeed feed;
+  TestRng rng(1);
+  for (int i = 0; i < 200; ++i) {
+    const HeadAngles truth{rng.uniform(-2, 2), rng.uniform(-1.5, 0.5)};
+    const Eigen::Quaterniond ned_from_body = so3_exp(rng.normal3(0.3));
+    const Eigen::Vector3d nose = ned_from_body * Eigen::Vector3d::UnitX();
+    const Eigen::Quaterniond heading(
+        Eigen::AngleAxisd(std::atan2(nose.y(), nose.x()), Eigen::Vector3d::UnitZ()));
+    const Eigen::Quaterniond ned_from_camera =
+        ned_from_body * chain.body_from_base->rotation * base_from_camera(chain, truth).rotation;
+    const Eigen::Quaterniond told =
+        heading.conjugate() * ned_from_camera * Eigen::Quaterniond(frd_from_camera).conjugate();
+    VehicleHistory history;
+    add_attitude(history, ned_from_body, 1000 * kMs);
+    GimbalDeviceAttitudeStatus status;
+    const Eigen::Quaternionf f = told.cast<float>();
+    status.q = {f.w(), f.x(), f.y(), f.z()};
+    status.flags = 32;  // GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+    ASSERT_TRUE(history.add(status, 154, 1000 * kMs));
+    const auto angles = feed.head_angles_at(history, chain, 1010 * kMs);
+    ASSERT_TRUE(angles);
+    EXPECT_NEAR(angles->pan, truth.pan, 3 * kFloatAngle);
+    EXPECT_NEAR(angles->tilt, truth.tilt, 3 * kFloatAngle);
+    EXPECT_FALSE(feed.head_angles_at(history, chain, 1101 * kMs));  // too long ago
+  }
+  // A third axis keeps the horizon: two angles cannot tell of it.
+  VehicleHistory history;
+  add_attitude(history, so3_exp({0.2, 0, 0}), 1000 * kMs);
+  GimbalDeviceAttitudeStatus level;
+  level.q = {1, 0, 0, 0};
+  level.flags = 32;
+  ASSERT_TRUE(history.add(level, 154, 1000 * kMs));
+  EXPECT_FALSE(feed.head_angles_at(history, chain, 1000 * kMs));
+}
+
 }  // namespace
 }  // namespace perch::mavlink

@@ -61,4 +61,19 @@ std::optional<Eigen::Quaterniond> AutopilotFeed::attitude_at(const VehicleHistor
   return sample->ned_from_body;
 }
 
+std::optional<HeadAngles> AutopilotFeed::head_angles_at(const VehicleHistory& history,
+                                                        const FrameChain& chain,
+                                                        int64_t camera_time_ns) const {
+  const int64_t time_ns = camera_time_ns - time_offset_ns_;
+  const auto gimbal = history.gimbal_at(time_ns);
+  const auto body = history.attitude_at(time_ns);
+  if (!gimbal || !body) return std::nullopt;
+  // Forward, right, down are a camera's z, x, y.
+  Eigen::Matrix3d frd_from_camera;
+  frd_from_camera << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  const Eigen::Quaterniond body_from_gimbal =
+      body->ned_from_body.conjugate() * ned_from_gimbal(*gimbal, body->ned_from_body);
+  return head_angles_of(chain, body_from_gimbal * Eigen::Quaterniond(frd_from_camera));
+}
+
 }  // namespace perch::mavlink

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "perch/frames/frame_chain.h"
 #include "perch/links/mavlink/vehicle_history.h"
 #include "perch/tracking/autopilot_sample.h"
 
@@ -21,6 +22,10 @@ class AutopilotFeed {
   std::vector<AutopilotSample> take(const VehicleHistory& history);
 
   std::optional<Eigen::Quaterniond> attitude_at(const VehicleHistory& history, int64_t camera_time_ns) const;
+
+  // How a pan/tilt head holds the camera, as a gimbal and the autopilot tell.
+  std::optional<HeadAngles> head_angles_at(const VehicleHistory& history, const FrameChain& chain,
+                                           int64_t camera_time_ns) const;
 
   static constexpr double kMostSamplesHz = 60;
 

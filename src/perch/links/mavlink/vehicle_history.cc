@@ -128,6 +128,22 @@ std::optional<AttitudeSample> VehicleHistory::attitude_at(int64_t time_ns) const
   return sample;
 }
 
+std::optional<GimbalSample> VehicleHistory::gimbal_at(int64_t time_ns) const {
+  const auto around = gimbal_.around(time_ns);
+  if (!around) return std::nullopt;
+  const auto& [before, after] = *around;
+  const int64_t past = time_ns - before->time_ns;
+  if (past > (after ? 2 : 1) * kMaxGimbalAhead) return std::nullopt;
+  GimbalSample sample = *before;
+  sample.time_ns = time_ns;
+  if (!after) return sample;
+  const int64_t gap = after->time_ns - before->time_ns;
+  // Rotations against different axes have none between them.
+  if (gap > 2 * kMaxGimbalAhead || after->flags != before->flags) return std::nullopt;
+  sample.rotation = before->rotation.slerp(seconds(past) / seconds(gap), after->rotation);
+  return sample;
+}
+
 std::optional<MotionSample> VehicleHistory::motion_at(int64_t time_ns) const {
   const auto around = motions_.around(time_ns);
   if (!around) return std::nullopt;

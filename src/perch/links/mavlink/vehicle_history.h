@@ -70,6 +70,9 @@ class VehicleHistory {
 
   std::optional<AttitudeSample> attitude_at(int64_t time_ns) const;
   std::optional<MotionSample> motion_at(int64_t time_ns) const;
+  // Beyond the last sample, and across a gap of twice that, it is not known: a head turns 80 deg/s.
+  static constexpr int64_t kMaxGimbalAhead = 100'000'000;
+  std::optional<GimbalSample> gimbal_at(int64_t time_ns) const;
 
   const History<AttitudeSample>& attitudes() const { return attitudes_; }
   const History<MotionSample>& motions() const { return motions_; }
