@@ -49,6 +49,8 @@ TEST_F(Recording, KilledAtAnyMomentItLosesASecondAtMost) {
       ASSERT_GT(child, 0);
       children.push_back(child);
     }
+    // The first video of a process takes its time to begin.
+    for (int c = 0; c < kAtATime; ++c) wait_until([&] { return progress[c].pictures > 0; });
     std::this_thread::sleep_for(std::chrono::microseconds(100'000 + rng.bits() % 300'000));
     std::vector<std::pair<int, int>> a_second_ago;
     for (int c = 0; c < kAtATime; ++c) a_second_ago.emplace_back(progress[c].frames, progress[c].pictures);
