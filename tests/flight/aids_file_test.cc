@@ -25,7 +25,10 @@ bool same(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 bool same(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return same(a.w(), b.w()) && same(Eigen::Vector3d(a.vec()), Eigen::Vector3d(b.vec()));
 }
-bool same(const HeadAngles& a, const HeadAngles& b) { return same(a.pan, b.pan) && same(a.tilt, b.tilt); }
+bool same(const HeadAngles& a, const HeadAngles& b) {
+  return same(a.pan, b.pan) && same(a.tilt, b.tilt) && same(a.pan_sigma, b.pan_sigma) &&
+         same(a.tilt_sigma, b.tilt_sigma) && same(a.roll, b.roll);
+}
 template <typename T>
 bool same(const std::optional<T>& a, const std::optional<T>& b) {
   return a.has_value() == b.has_value() && (!a || same(*a, *b));
@@ -58,7 +61,9 @@ Eigen::Quaterniond any_quaternion(TestRng& rng) {
 Estimator::Aid any_aid(TestRng& rng) {
   const auto perhaps = [&] { return rng.bits() % 3 != 0; };
   Estimator::Aid aid;
-  if (perhaps()) aid.angles = HeadAngles{any_number(rng), any_number(rng)};
+  if (perhaps())
+    aid.angles =
+        HeadAngles{any_number(rng), any_number(rng), any_number(rng), any_number(rng), any_number(rng)};
   if (perhaps()) aid.world_from_body = any_quaternion(rng);
   aid.autopilot.resize(rng.bits() % 4);
   for (AutopilotSample& sample : aid.autopilot) {
@@ -98,7 +103,7 @@ TEST(AidsFile, EveryRowHasAllColumns) {
   for (int i = 0; i < 50; ++i) append_aid(i, any_aid(rng), csv);
   std::istringstream lines(csv);
   for (std::string line; std::getline(lines, line);)
-    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 17) << line;
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 20) << line;
 }
 
 TEST(AidsFile, CutOffAnywhereItKeepsTheFramesBefore) {

@@ -28,7 +28,7 @@ struct Estimate {
   std::vector<StageTime> stages;  // every step, in order, also those inside `detect_us` and `pose_us`
   std::vector<Correspondence> correspondences;
   std::string problem;                           // with kUnreadable: "place: cause"
-  std::optional<UncertainRigid3> pad_from_body;  // with kOk, through the frame chain
+  std::optional<UncertainRigid3> pad_from_body;  // with kOk, through the frame chain; but for a head's unknown angles
   std::optional<VehicleState> state;             // from the first detection on
 };
 

@@ -88,7 +88,7 @@ Estimator::Estimator(const RunConfig& config, const CameraModel& camera)
 std::optional<Prediction> Estimator::predict(int64_t timestamp_ns,
                                              const std::optional<HeadAngles>& angles) const {
   const auto state = filter_.predict_widely(timestamp_ns);
-  if (!state || head_is_unknown(frames_, angles)) return std::nullopt;
+  if (!state || !knows_camera(frames_, angles)) return std::nullopt;
   return Prediction{camera_from_target_of(
       frames_, {state->pad_from_body, state->covariance.topLeftCorner<6, 6>()}, angles)};
 }
@@ -113,8 +113,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
   stopwatch.restart();
   std::vector<NormalHint> hints;
   if (prediction) hints.push_back(from_prediction(*prediction));
-  const bool mounted = !head_is_unknown(frames_, aid.angles);
-  if (aid.world_from_body && mounted) {
+  if (aid.world_from_body && knows_camera(frames_, aid.angles)) {
     const auto normal = level_normal_in_camera(frames_, *aid.world_from_body, aid.angles);
     if (normal) hints.push_back({*normal, gravity_sigma_});
   }
@@ -128,7 +127,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
   if (estimate.status != EstimateStatus::kOk) return;
   deformation_ = pose.deformation;
   estimate.camera_from_target = pose.camera_from_target;
-  if (mounted)
+  if (knows_camera(frames_, aid.angles))
     estimate.pad_from_body = pad_from_body_by_vision(frames_, pose.camera_from_target, aid.angles);
   stopwatch.lap("frames");
 }

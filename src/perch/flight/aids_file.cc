@@ -13,7 +13,7 @@ constexpr std::string_view kFrame = "frame", kAutopilot = "autopilot";
 
 // A number of each row that is not there is an empty field. Not finite ones are numbers, too: the estimator
 // was given them.
-constexpr std::array<ColumnName, 18> kColumns{"timestamp [ns]",
+constexpr std::array<ColumnName, 21> kColumns{"timestamp [ns]",
                                               "kind",
                                               "said",
                                               "q_w",
@@ -30,7 +30,10 @@ constexpr std::array<ColumnName, 18> kColumns{"timestamp [ns]",
                                               "velocity_sigma [m/s]",
                                               "angular_velocity_sigma [rad/s]",
                                               "pan [rad]",
-                                              "tilt [rad]"};
+                                              "tilt [rad]",
+                                              "pan_sigma [rad]",
+                                              "tilt_sigma [rad]",
+                                              "roll [rad]"};
 constexpr size_t kTime = 0, kKind = 1, kSaid = 2, kAttitude = 3, kVelocity = 7, kAngularVelocity = 10,
                  kSigmas = 13, kHead = 16;
 
@@ -56,7 +59,7 @@ void append_sample(const AutopilotSample& sample, std::string& csv) {
   for (const double sigma : {sample.attitude_sigma, sample.velocity_sigma, sample.angular_velocity_sigma}) {
     append_field(csv, sigma);
   }
-  csv += ",,\n";
+  csv += ",,,,,\n";
 }
 
 class AidRow {
@@ -115,7 +118,9 @@ FrameAid frame_of(const AidRow& row, std::vector<AutopilotSample>& said) {
     row.fail(kSaid, std::to_string(said.size()) + " as rows before it could be used");
   }
   frame.aid.world_from_body = row.quaternion(kAttitude);
-  if (!row.text(kHead).empty()) frame.aid.angles = HeadAngles{row.number(kHead), row.number(kHead + 1)};
+  if (!row.text(kHead).empty())
+    frame.aid.angles = HeadAngles{row.number(kHead), row.number(kHead + 1), row.number(kHead + 2),
+                                  row.number(kHead + 3), row.number(kHead + 4)};
   frame.aid.autopilot = std::move(said);
   return frame;
 }
@@ -138,10 +143,10 @@ void append_aid(int64_t frame_timestamp_ns, const Estimator::Aid& aid, std::stri
   append_quaternion(aid.world_from_body, csv);
   csv.append(3 + 3 + 3, ',');
   if (aid.angles) {
-    append_field(csv, aid.angles->pan);
-    append_field(csv, aid.angles->tilt);
+    const HeadAngles& a = *aid.angles;
+    for (const double value : {a.pan, a.tilt, a.pan_sigma, a.tilt_sigma, a.roll}) append_field(csv, value);
   } else {
-    csv.append(2, ',');
+    csv.append(5, ',');
   }
   csv += '\n';
 }

@@ -33,7 +33,8 @@ Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>
   const HeadAngles a = angles.value_or(HeadAngles{});
   const Eigen::Quaterniond pan(Eigen::AngleAxisd(a.pan, Eigen::Vector3d::UnitY()));
   const Eigen::Quaterniond tilt(Eigen::AngleAxisd(a.tilt, Eigen::Vector3d::UnitX()));
-  return chain.pan_tilt->base_from_zero * Rigid3{pan * tilt, Eigen::Vector3d::Zero()};
+  const Eigen::Quaterniond roll(Eigen::AngleAxisd(a.roll, Eigen::Vector3d::UnitZ()));
+  return chain.pan_tilt->base_from_zero * Rigid3{pan * tilt * roll, Eigen::Vector3d::Zero()};
 }
 
 std::optional<HeadAngles> head_angles_of(const FrameChain& chain,
@@ -58,8 +59,24 @@ std::optional<HeadAngles> head_angles_of(const FrameChain& chain,
 
 namespace {
 
-Rigid3 camera_from_body(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
-  return inverse(chain.body_from_base.value_or(Rigid3{}) * base_from_camera(chain, angles));
+// Of a small turn of the head: numeric, so that it holds for axes that do not meet, too. The error is that of
+// a central difference, 1e-9 of the lever arm and the angle.
+PoseCovariance head_covariance(const FrameChain& chain, const HeadAngles& at) {
+  constexpr double kStep = 1e-4;  // rad
+  const auto derivative = [&](double pan, double tilt) {
+    const Rigid3 less = base_from_camera(chain, HeadAngles{at.pan - pan, at.tilt - tilt, 0, 0, at.roll});
+    const Rigid3 more = base_from_camera(chain, HeadAngles{at.pan + pan, at.tilt + tilt, 0, 0, at.roll});
+    return PoseError(pose_error(less, more) / (2 * kStep));
+  };
+  const PoseError by_pan = at.pan_sigma * derivative(kStep, 0);
+  const PoseError by_tilt = at.tilt_sigma * derivative(0, kStep);
+  return by_pan * by_pan.transpose() + by_tilt * by_tilt.transpose();
+}
+
+UncertainRigid3 camera_from_body(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
+  UncertainRigid3 head{base_from_camera(chain, angles)};
+  if (chain.pan_tilt && angles) head.covariance = head_covariance(chain, *angles);
+  return inverse(UncertainRigid3{chain.body_from_base.value_or(Rigid3{})} * head);
 }
 
 }  // namespace
@@ -67,12 +84,12 @@ Rigid3 camera_from_body(const FrameChain& chain, const std::optional<HeadAngles>
 UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,
                                         const std::optional<HeadAngles>& angles) {
   return UncertainRigid3{inverse(chain.target_from_pad)} * inverse(camera_from_target) *
-         UncertainRigid3{camera_from_body(chain, angles)};
+         camera_from_body(chain, angles);
 }
 
 UncertainRigid3 camera_from_target_of(const FrameChain& chain, const UncertainRigid3& pad_from_body,
                                       const std::optional<HeadAngles>& angles) {
-  return UncertainRigid3{camera_from_body(chain, angles)} * inverse(pad_from_body) *
+  return camera_from_body(chain, angles) * inverse(pad_from_body) *
          UncertainRigid3{inverse(chain.target_from_pad)};
 }
 
@@ -80,7 +97,7 @@ std::optional<Eigen::Vector3d> level_normal_in_camera(const FrameChain& chain,
                                                       const Eigen::Quaterniond& world_from_body,
                                                       const std::optional<HeadAngles>& angles) {
   const Eigen::Quaterniond camera_from_world =
-      camera_from_body(chain, angles).rotation * world_from_body.conjugate();
+      camera_from_body(chain, angles).mean.rotation * world_from_body.conjugate();
   if (!camera_from_world.coeffs().allFinite()) return std::nullopt;
   if (chain.world_from_pad) {
     const Eigen::Quaterniond world_from_target =

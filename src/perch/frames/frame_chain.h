@@ -18,7 +18,10 @@ struct PanTilt {
 };
 
 struct HeadAngles {
-  double pan = 0, tilt = 0;  // rad
+  double pan = 0, tilt = 0;              // rad
+  double pan_sigma = 0, tilt_sigma = 0;  // how well they are known at that moment, rad
+  double roll =
+      0;  // then, about the optical axis, clockwise as the camera sees it: of stabilised gimbals alone, rad
 };
 
 // The frame chain of the paper's figure 3.2; the letters are those of its table 3.1.
@@ -47,13 +50,13 @@ Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>
 // angles do: a third axis keeps the horizon level, or base_from_zero is another head's.
 std::optional<HeadAngles> head_angles_of(const FrameChain& chain, const Eigen::Quaterniond& body_from_camera);
 
-// A head turns the camera, and nobody knows how far: where the body is does not follow from the picture.
-inline bool head_is_unknown(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
-  return chain.pan_tilt && !angles;
+// A head's angles tell where the camera is only when they are known.
+inline bool knows_camera(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
+  return !chain.pan_tilt || angles;
 }
 
-// What vision says: the pose of the body in the pad frame, with the covariance of the camera's pose. A
-// missing body_from_base counts as the identity.
+// What vision says: the pose of the body in the pad frame, with the covariance of the camera's pose and that
+// of the head's angles. A missing body_from_base counts as the identity.
 UncertainRigid3 pad_from_body_by_vision(const FrameChain& chain, const UncertainRigid3& camera_from_target,
                                         const std::optional<HeadAngles>& angles = {});
 
