@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "perch/config/error.h"
 #include "perch/geometry/so3.h"
 
 namespace perch {
@@ -21,6 +22,11 @@ LiveSimulation::LiveSimulation(const Simulation& simulation, Pace pace, LiveCloc
     error.velocity = report.body_velocity_in_world - truth.body_velocity_in_world;
     errors_.push_back(error);
   }
+  if (!simulation.head.empty()) {
+    if (pace != Pace::kRealTime)
+      throw ConfigError("camera.pace: expected real_time, as a head turns the simulation's camera");
+    head_ = std::make_unique<HeadFeed>(simulation.head);
+  }
   if (pace == Pace::kRealTime) clock_offset_ns_ = clock.now_ns() - flight_.timestamp_ns(0);
 }
 
@@ -31,6 +37,10 @@ int64_t LiveSimulation::stamp_ns(int64_t frame) const {
 std::optional<LiveFrame> LiveSimulation::next(std::chrono::nanoseconds timeout) {
   const int64_t deadline = clock_.now_ns() + timeout.count();
   if (ended_) return std::nullopt;
+  if (head_) {
+    clock_.sleep_until(std::min(due_ns(frame_), deadline));
+    if (clock_.now_ns() < due_ns(frame_)) return std::nullopt;
+  }
   if (!picture_) render();
   if (ended_) return std::nullopt;
   if (pace_ == Pace::kRealTime) {
@@ -48,7 +58,9 @@ void LiveSimulation::render() {
   const int64_t start = clock_.now_ns();
   if (pace_ == Pace::kRealTime) {
     // Pictures that could not be ready in time are left out, or each would be later than the one before.
-    const int64_t ready = start + static_cast<int64_t>(cost_ns_);
+    // One that is rendered after its exposure has the time to the next one.
+    const int64_t ready = head_ ? start - static_cast<int64_t>(1e9 / flight_.simulation().rate_hz)
+                                : start + static_cast<int64_t>(cost_ns_);
     for (; frame_ < flight_.frames() && due_ns(frame_) < ready; ++frame_) {
       tally_.add(&LiveCounters::dropped);
     }
@@ -58,7 +70,9 @@ void LiveSimulation::render() {
   picture_.emplace();
   picture_->timestamp_ns = stamp_ns(frame_);
   picture_->name = std::to_string(frame_);
-  picture_->grey = flight_.picture(frame_);
+  HeadAngles angles;
+  if (head_) angles = head_->at(stamp_ns(frame_)).value_or(angles);
+  picture_->grey = flight_.picture(frame_, angles);
   const auto cost = static_cast<double>(clock_.now_ns() - start);
   cost_ns_ += cost_ns_ == 0 ? cost : (cost - cost_ns_) / 8;
 }

@@ -8,6 +8,7 @@
 #include "perch/camera/live_clock.h"
 #include "perch/camera/live_source.h"
 #include "perch/camera/live_tally.h"
+#include "perch/simulation/head_feed.h"
 #include "perch/simulation/simulation.h"
 
 namespace perch {
@@ -17,7 +18,9 @@ namespace perch {
 // In real time the flight begins when this is made, and stamps are on CLOCK_MONOTONIC. Each picture is
 // rendered (20 to 30 ms at 640x480) before its time and given out when its exposure and readout would be
 // over; a machine too slow for the rate leaves pictures out, counted as dropped. As fast as possible,
-// pictures and stamps are those that perch-simulate writes, none left out; recorded() is then true.
+// pictures and stamps are those that perch-simulate writes, none left out; recorded() is then true. With a
+// head that turns the camera a picture is rendered after its exposure, in real time alone: ConfigError
+// otherwise.
 //
 // One thread calls next(), any other the rest.
 class LiveSimulation : public LiveSource {
@@ -60,6 +63,7 @@ class LiveSimulation : public LiveSource {
   int64_t exposed_ns_ = 0;               // from the middle of the exposure to the end of the readout
   std::vector<NavigationError> errors_;  // in the order of their times
   int64_t frame_ = 0;                    // the next one
+  std::unique_ptr<HeadFeed> head_;       // where the camera turns
   std::optional<Frame> picture_;         // of frame_, once it is rendered
   double cost_ns_ = 0;                   // of rendering a picture, smoothed
   std::atomic<bool> ended_ = false;

@@ -65,16 +65,21 @@ Eigen::Vector3d SimulatedFlight::body_velocity_in_pad(int64_t frame) const {
          pad_truth.angular_velocity_in_pad.cross(pad_from_body(frame).translation);
 }
 
-Rigid3 SimulatedFlight::camera_from_target_at(double time) const {
-  const Rigid3 world_from_camera = descent_.at(time).world_from_body * simulation_.body_from_camera;
+Rigid3 SimulatedFlight::camera_from_target_at(double time, const HeadAngles& head) const {
+  FrameChain chain;
+  chain.pan_tilt.emplace();
+  const Rigid3 world_from_camera =
+      descent_.at(time).world_from_body * simulation_.body_from_camera * base_from_camera(chain, head);
   return inverse(world_from_camera) * deck_.at(time).world_from_pad;
 }
 
-Rigid3 SimulatedFlight::camera_from_target(int64_t frame) const { return camera_from_target_at(time(frame)); }
+Rigid3 SimulatedFlight::camera_from_target(int64_t frame) const {
+  return camera_from_target_at(time(frame), {});
+}
 
-cv::Mat_<uint8_t> SimulatedFlight::picture(int64_t frame) const {
+cv::Mat_<uint8_t> SimulatedFlight::picture(int64_t frame, const HeadAngles& head) const {
   const double middle = time(frame);
-  const PoseAt pose = [&](double t) { return camera_from_target_at(middle + t); };
+  const PoseAt pose = [&](double t) { return camera_from_target_at(middle + t, head); };
   const auto radiance = renderer_.radiance(pose, simulation_.shutter, middle);
   return sensor_.picture(radiance, stream_seed(simulation_.seed, kPictureStream),
                          static_cast<uint64_t>(frame));

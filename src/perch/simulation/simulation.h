@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "perch/camera/camera_model.h"
 #include "perch/config/section.h"
+#include "perch/frames/frame_chain.h"
 #include "perch/simulation/deck.h"
 #include "perch/simulation/descent.h"
 #include "perch/simulation/navigation.h"
@@ -22,6 +24,10 @@ struct Simulation {
   double rate_hz = 30;
   // Under the nose, looking down and 8 degrees forward; up in the picture is forward.
   Rigid3 body_from_camera;
+  // Who tells where a head turns the camera to (perch-visca-sim --truth); empty: it is fixed.
+  // body_from_camera is then that at zero angles. For pictures as they happen alone: a head answers to what
+  // is seen.
+  std::string head;
   // Level, face up: the pad's z is -z of NED.
   Rigid3 world_from_pad;
   // A pad on a ship moves about that place; the flight goes to it, too, and does not follow the deck.
@@ -53,13 +59,13 @@ class SimulatedFlight {
   Rigid3 pad_from_body(int64_t frame) const;
   Eigen::Vector3d body_velocity_in_pad(int64_t frame) const;  // as seen from the pad, m/s
   Rigid3 camera_from_target(int64_t frame) const;
-  cv::Mat_<uint8_t> picture(int64_t frame) const;
+  cv::Mat_<uint8_t> picture(int64_t frame, const HeadAngles& head = {}) const;
   std::vector<NavigationReport> navigation() const;
   const Simulation& simulation() const { return simulation_; }
 
  private:
   double time(int64_t frame) const;  // since the start, s
-  Rigid3 camera_from_target_at(double time) const;
+  Rigid3 camera_from_target_at(double time, const HeadAngles& head) const;
 
   Simulation simulation_;
   Descent descent_;

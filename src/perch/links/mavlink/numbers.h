@@ -43,6 +43,8 @@ inline constexpr uint8_t kLocalOffsetNed = 2;  // axes of NED, origin at the veh
 namespace mav_command {
 inline constexpr uint16_t kSetMessageInterval = 511;  // param1 id, param2 interval in us
 inline constexpr uint16_t kRequestMessage = 512;      // param1 id
+inline constexpr uint16_t kGimbalManagerConfigure =
+    1001;  // param1, 2 who controls, -1 in 3, 4: as it is, 7 the gimbal
 }  // namespace mav_command
 
 namespace mav_result {
