@@ -48,6 +48,11 @@ LiveConfig read_live_config(Section root) {
   config.run = read_run_config(root);
   if (config.run.source.empty()) root.section("camera").fail("source", "where the pictures come from");
   read_nav(root, config);
+  config.ptz = read_ptz_options(root.section("ptz"));
+  if (is_replay(config)) config.ptz.reset();  // its angles are recorded
+  if (config.ptz && !config.run.frames.pan_tilt) {
+    root.section("frames").fail("base_from_camera", "pan_tilt: {...}, as ptz.device turns the camera");
+  }
   Section outputs = root.section("outputs");
   config.mavlink = mavlink::read_mavlink_options(outputs);
   config.mavlink.link.gimbal = config.run.frames.pan_tilt.has_value();

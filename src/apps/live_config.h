@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "live_ptz.h"
 #include "perch/config/section.h"
 #include "perch/estimator/run_config.h"
 #include "perch/links/mavlink/mavlink_options.h"
@@ -23,7 +24,8 @@ struct LiveConfig {
   NavSource nav = NavSource::kNone;
   std::optional<StreamUrl> autopilot;  // with kMavlink
   mavlink::MavlinkOptions mavlink;
-  std::filesystem::path record;  // outputs.record; empty: nothing is recorded
+  std::optional<PtzOptions> ptz;  // a head that turns the camera
+  std::filesystem::path record;   // outputs.record; empty: nothing is recorded
   std::string record_format = "png";
 };
 

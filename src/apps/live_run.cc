@@ -56,6 +56,9 @@ LiveRun::LiveRun(const LiveConfig& config, OpenedSource source, LinkTap tap, OnE
   } else if (config.nav == NavSource::kFlight && source_.flight) {
     aids_ = std::make_unique<FlightAids>(*source_.flight, with_mount_of(config, source_).frames, config.run);
   }
+  if (config.ptz) {
+    ptz_ = std::make_unique<LivePtz>(*config.ptz, with_mount_of(config, source_).frames, source_.camera);
+  }
   estimator_thread_ = std::thread([this] { guard([this] { estimate(); }); });
   capture_thread_ = std::thread([this] { guard([this] { capture(); }); });
 }
@@ -122,14 +125,21 @@ void LiveRun::estimate() {
     latency_.add(LiveStage::kWaiting, taken_ns - picture.arrived_ns);
     latency_.add(LiveStage::kEstimate, monotonic_ns() - taken_ns);
     hand_on(picture, estimate);
+    if (ptz_) ptz_->report(estimate.state, aid.world_from_body);
     if (on_estimate_) on_estimate_(picture.frame, aid, estimate);
   }
   finished_ = true;
 }
 
 Estimator::Aid LiveRun::aid_at(int64_t camera_time_ns) {
-  if (link_) return link_->aid_at(camera_time_ns);
-  return aids_ ? aids_->at(camera_time_ns) : Estimator::Aid{};
+  Estimator::Aid aid;
+  if (link_) {
+    aid = link_->aid_at(camera_time_ns);
+  } else if (aids_) {
+    aid = aids_->at(camera_time_ns);
+  }
+  if (ptz_) aid.angles = ptz_->angles_at(camera_time_ns);
+  return aid;
 }
 
 void LiveRun::hand_on(const LiveFrame& picture, const Estimate& estimate) {
@@ -176,6 +186,10 @@ nlohmann::ordered_json LiveRun::summary() const {
   if (link_) {
     json["cpu_s"]["link"] = link_->cpu_seconds();
     json["mavlink"] = link_->summary();
+  }
+  if (ptz_) {
+    json["cpu_s"]["ptz"] = ptz_->cpu_seconds();
+    json["ptz"] = ptz_->summary();
   }
   if (aids_) json["problems"] = aids_->problems();
   return json;

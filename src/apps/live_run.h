@@ -11,6 +11,7 @@
 
 #include "flight_aids.h"
 #include "live_link.h"
+#include "live_ptz.h"
 #include "live_report.h"
 #include "live_source_of.h"
 #include "newest_frame.h"
@@ -67,6 +68,7 @@ class LiveRun {
   NewestFrame slot_;
   std::unique_ptr<LiveLink> link_;
   std::unique_ptr<FlightAids> aids_;
+  std::unique_ptr<LivePtz> ptz_;
 
   mutable std::mutex mutex_;  // guards what follows
   mavlink::PadWatch watch_;

@@ -68,6 +68,11 @@ int run(const perch::CommandLine& line) {
     std::cout << root.resolved();
     return 0;
   }
+  if (!simulation.head.empty()) {
+    throw perch::ConfigError(FLAGS_config +
+                             ": camera.head: expected none, as a head answers to what is seen: perch-live "
+                             "with camera.source sim:FILE flies it");
+  }
   if (FLAGS_output.empty()) throw perch::UsageError("--output: expected a folder, found nothing");
 
   perch::FlightFolder folder(FLAGS_output, FLAGS_force);

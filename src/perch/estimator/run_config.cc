@@ -57,6 +57,7 @@ RunConfig read_run_config(Section root) {
   std::string nav = "flight";
   root.read("nav", nav);
   root.section("outputs");
+  root.section("ptz");
   root.done();
   return config;
 }

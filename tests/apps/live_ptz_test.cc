@@ -1,0 +1,65 @@
+// perch-live and perch-visca-sim as a user starts them: a simulated flight seen through a head that turns.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "support/child_program.h"
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace perch {
+namespace {
+
+const std::string kConfigs = std::string(PERCH_SOURCE_DIR) + "/configs";
+
+TEST(LivePtz, FollowsThePadThroughASimulatedHead) {
+  const TempFolder folder;
+  const std::string terminal = folder / "evi", port = std::to_string(20000 + getpid() % 20000);
+  ChildProgram device(folder, PERCH_VISCA_SIM, {"--pty", terminal, "--truth", "udp://127.0.0.1:" + port});
+  ASSERT_TRUE(device.says("an EVI-D30 at", 5));
+  folder.write("sim.yaml",
+               "target: " + kConfigs +
+                   "/targets/sharp.yaml\n"
+                   "camera:\n  width: 320\n  height: 240\n  rate_hz: 15\n"
+                   "  lens: LENSMODEL_PINHOLE\n  intrinsics: [352.7, 352.7, 159.5, 119.5]\n"
+                   "  body_from_camera: {position: [0.1, 0, 0.05], rotation: {ypr_deg: [90, 0, 0]}}\n"
+                   "  head: udp:127.0.0.1:" +
+                   port +
+                   "\nflight: {start_height: 5, start_aside: 1, duration: 6, hover: 1, "
+                   "touchdown_height: 2.5, gust_attitude_deg: 2}\n");
+  folder.write("live.yaml", "target: " + kConfigs +
+                                "/targets/sharp.yaml\ncamera: {source: \"sim:sim.yaml\"}\n"
+                                "frames: {base_from_camera: {pan_tilt: {}}}\n"
+                                "ptz: {device: \"visca+serial:" +
+                                terminal + ":9600\"}\n");
+  const std::filesystem::path summary = folder / "summary.json";
+  TempFolder live_folder;
+  ChildProgram live(live_folder, PERCH_LIVE, {"--config", folder / "live.yaml", "--summary", summary});
+  ASSERT_EQ(live.wait(60), 0) << live.err();
+  const auto json = nlohmann::json::parse(read_file(summary));
+  std::printf("%s\n", json["ptz"].dump().c_str());
+  std::printf("%s\n", json["status"].dump().c_str());
+  EXPECT_TRUE(json["ptz"]["ready"]);
+  EXPECT_GT(json["ptz"]["positions"], 50);
+  EXPECT_GT(json["ptz"]["followed"], 20);
+  EXPECT_GT(json["ptz"]["acks"], 5);
+  // A machine that does other things leaves pictures out; most of those it takes have a pose.
+  EXPECT_GT(json["status"]["ok"], json["frames"].get<int>() / 2);
+}
+
+TEST(LivePtz, AHeadNeedsTheFrameThatTurns) {
+  const TempFolder folder;
+  folder.write("live.yaml", "target: " + kConfigs +
+                                "/targets/sharp.yaml\ncamera: {source: \"sim:" + kConfigs +
+                                "/simulation/landing.yaml\"}\nptz: {device: \"visca+tcp://127.0.0.1:1\"}\n");
+  TempFolder live_folder;
+  ChildProgram live(live_folder, PERCH_LIVE, {"--config", folder / "live.yaml"});
+  EXPECT_EQ(live.wait(20), 2);
+  EXPECT_TRUE(live.says("base_from_camera: expected pan_tilt", 1)) << live.err();
+}
+
+}  // namespace
+}  // namespace perch
