@@ -21,6 +21,13 @@ struct Correspondence {
   double sigma_px = 1;  // standard deviation of each coordinate
 };
 
+// A measured piece of an edge, for people: where it is, and how far off the homography that fits all best.
+struct EdgeResidual {
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();   // the middle of the piece
+  Eigen::Vector2f normal = Eigen::Vector2f::Zero();  // unit, from black to white
+  float left_px = 0;                                 // found further towards white by so much
+};
+
 // All measured edges of a frame at once: the homography that they fit best, and how well they know it. What
 // it loses of them is what is beyond second order in a step of a fraction of a pixel.
 struct PlaneMeasurement {
@@ -46,6 +53,7 @@ struct Detection {
   DetectionStatus status = DetectionStatus::kNoTarget;
   std::vector<Correspondence> correspondences;  // empty unless found
   std::optional<PlaneMeasurement> plane;        // with `edges`: what the correspondences are drawn from
+  std::vector<EdgeResidual> residuals;          // with `edges`
   std::vector<StageTime> stages;
   int threshold = -1;  // grey level, where the method has one
 };

@@ -284,6 +284,11 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
   plane.rms_px = fit.rms_px;
   plane.growth_px = fit.growth;
   plane.edges = static_cast<int>(offsets.size());
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    const EdgePiece& piece = pieces[static_cast<size_t>(measured[i])];
+    detection.residuals.push_back(
+        {piece.middle.cast<float>(), piece.normal.cast<float>(), static_cast<float>(offsets[i].left)});
+  }
   return plane;
 }
 
@@ -321,6 +326,7 @@ const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<
   w.detection.status = DetectionStatus::kNoTarget;
   w.detection.correspondences.clear();
   w.detection.plane.reset();
+  w.detection.residuals.clear();
   w.detection.stages.clear();
   w.detection.threshold = -1;
   if (grey.empty() || grey.cols != w.camera.width() || grey.rows != w.camera.height()) return w.detection;

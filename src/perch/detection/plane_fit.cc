@@ -177,6 +177,7 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
   double squares = 0, weights = 0;
   for (size_t i = 0; i < rows.size(); ++i) {
     const double r = offsets[i].sigma * static_cast<double>(residuals[i]);
+    offsets[i].left = r;
     squares += offsets[i].weight * r * r;
     weights += offsets[i].weight;
   }

@@ -54,6 +54,7 @@ struct EdgeOffset {
   double outline = 0;     // the same by what the outline grows otherwise
   double modulation = 0;  // of the step: its height as a part of its upper level
   double weight = 1;      // of the robust loss
+  double left = 0;        // of the offset, once it is fitted, px
 };
 
 struct PlaneFit {

@@ -27,6 +27,8 @@ struct Estimate {
   double detect_us = 0, pose_us = 0, total_us = 0;
   std::vector<StageTime> stages;  // every step, in order, also those inside `detect_us` and `pose_us`
   std::vector<Correspondence> correspondences;
+  std::vector<EdgeResidual> residuals;
+  int threshold = -1;                            // grey level, where the method had one
   std::string problem;                           // with kUnreadable: "place: cause"
   std::optional<UncertainRigid3> pad_from_body;  // with kOk, through the frame chain; but for a head's unknown angles
   std::optional<VehicleState> state;             // from the first detection on

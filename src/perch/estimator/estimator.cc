@@ -105,6 +105,8 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
   estimate.detect_us = stopwatch.since_lap_us();
   estimate.stages = detection.stages;
   estimate.correspondences = detection.correspondences;
+  estimate.residuals = detection.residuals;
+  estimate.threshold = detection.threshold;
   estimate.features = static_cast<int>(detection.correspondences.size());
   if (detection.status != DetectionStatus::kFound) {
     estimate.status = from_detection(detection.status);
