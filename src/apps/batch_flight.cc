@@ -8,6 +8,7 @@
 #include "flight_aids.h"
 #include "perch/analysis/output_files.h"
 #include "perch/analysis/overlay.h"
+#include "perch/analysis/pad_json.h"
 #include "perch/estimator/estimator.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/flight.h"
@@ -111,7 +112,8 @@ ReportFlight run_flight(const BatchFlight& job) {
   estimate_frames(job, *source, estimator, result);
   result.problems.insert(result.problems.end(), source->problems().begin(), source->problems().end());
 
-  ReportFlight report{score_flight(result), {}};
+  ReportFlight report{
+      score_flight(result), {}, pad_json(job.config.target, inverse(result.chain.target_from_pad))};
   write_outputs(job.output, result, report.score);
   report.pictures = draw_pictures(job, result, report.score, camera);
   return report;

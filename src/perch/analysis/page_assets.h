@@ -4,11 +4,8 @@
 
 namespace perch {
 
-// Files of web/ that every report carries in it, compiled in by embed.cmake.
-extern const std::string_view kUplotJs;  // node_modules/uplot
-extern const std::string_view kUplotCss;
-extern const std::string_view kPlotsJs;  // web/report
-extern const std::string_view kReportJs;
+// What every report carries in it, bundled by web/build.js and compiled in by embed.cmake.
+extern const std::string_view kReportJs;  // web/src/report with all that it imports
 extern const std::string_view kReportCss;
 
 }  // namespace perch

@@ -164,7 +164,7 @@ std::string report_html(std::span<const ReportFlight> flights, const std::string
   const auto add = [&html](std::initializer_list<std::string_view> parts) {
     for (const std::string_view part : parts) html += part;
   };
-  add({"<style>\n", kUplotCss, "\n", kReportCss, "</style>\n</head>\n<body>\n<main id=\"report\"></main>\n"});
+  add({"<style>\n", kReportCss, "</style>\n</head>\n<body>\n<main id=\"report\"></main>\n"});
   add(
       {"<noscript>This report draws its plots with JavaScript; the same numbers are in "
        "summary.json.</noscript>\n"});
@@ -173,11 +173,11 @@ std::string report_html(std::span<const ReportFlight> flights, const std::string
   for (const ReportFlight& flight : flights) {
     const Json data = {{"summary", summary_json(flight.score)},
                        {"frames", frames_json(flight.score)},
-                       {"pictures", pictures_json(flight)}};
+                       {"pictures", pictures_json(flight)},
+                       {"pad", flight.pad}};
     add({"<script class=\"flight\" type=\"application/json\">", for_script(data), "</script>\n"});
   }
-  add({"<script>", kUplotJs, "</script>\n<script>\n", kPlotsJs, "</script>\n<script>\n", kReportJs,
-       "</script>\n"});
+  add({"<script>\n", kReportJs, "</script>\n"});
   add({"</body>\n</html>\n"});
   return html;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@ struct ReportPicture {
 struct ReportFlight {
   FlightScore score;
   std::vector<ReportPicture> pictures;
+  nlohmann::json pad = nullptr;  // what the 3-D view draws, from pad_json; or null
 };
 
 // The page: one self-contained HTML file that asks the network for nothing. `configuration` is shown as it

@@ -1,36 +1,19 @@
-// The plots of the report, on uPlot: time plots that share cursor and zoom, the status strip, the scatter.
-'use strict';
-
-// The statuses in the order of their digits in the data. Colours of Okabe and Ito: told apart by the colour-blind.
-const STATUSES = [
-  {name: 'ok', words: 'pose', colour: '#009e73'},
-  {name: 'no_target', words: 'no target', colour: '#8c8c8c'},
-  {name: 'partial', words: 'partial', colour: '#e6b800'},
-  {name: 'ambiguous', words: 'ambiguous', colour: '#cc79a7'},
-  {name: 'rejected', words: 'rejected', colour: '#d55e00'},
-  {name: 'unreadable', words: 'unreadable', colour: '#3b3b3b'},
-];
-
-const theme = (name) => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
-
-// All digits that tell something, none that do not: 0.0123, 1.23, 123.
-function short(value) {
-  if (value == null || !isFinite(value)) return '–';
-  const size = Math.abs(value);
-  if (size >= 1e5 || (size > 0 && size < 1e-4)) return value.toExponential(1).replace('-', '−');
-  const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : size >= 0.1 ? 3 : 4;
-  return value.toFixed(digits).replace('-', '−');
-}
+// Plots on uPlot: time plots that share cursor and zoom, the status strip, the scatter.
+import uPlot from 'uplot';
+import {short} from '../common/format.js';
+import {STATUSES, statusColour} from '../common/names.js';
+import {theme} from '../common/theme.js';
 
 // Plots that show the same stretch of time: zooming one zooms all.
-class TimeGroup {
+export class TimeGroup {
   constructor(key) {
     this.key = key;
     this.plots = [];
     this.zooming = false;
+    this.quiet = false;  // while plots are being set one by one
   }
   zoom(from) {
-    if (this.zooming) return;
+    if (this.zooming || this.quiet) return;
     this.zooming = true;
     const {min, max} = from.scales.x;
     for (const plot of this.plots) {
@@ -42,26 +25,31 @@ class TimeGroup {
 
 // The time that each frame stands for: halfway to its neighbours, so that the first and the last have some too, but
 // not far into a time without frames.
-function spansOf(times) {
+export function spansOf(times) {
   const most = times.length > 1 ? 1.5 * (times[times.length - 1] - times[0]) / (times.length - 1) : 0.5;
   return times.map((time, i) => [
     time - Math.min(most, i > 0 ? (time - times[i - 1]) / 2 : most),
     time + Math.min(most, i + 1 < times.length ? (times[i + 1] - time) / 2 : most)]);
 }
 
-// Shades the frames without a pose behind the lines.
-function shadeGaps(times, status) {
+// The stretches of time in which no frame has a pose.
+export function gapsOf(times, status) {
   const gaps = [];
   spansOf(times).forEach(([from, to], i) => {
     if (status[i] === '0') return;
     if (gaps.length && gaps[gaps.length - 1][1] >= from) gaps[gaps.length - 1][1] = to;
     else gaps.push([from, to]);
   });
+  return gaps;
+}
+
+// Shades them behind the lines. `gaps`: a list, or a function that says which they are now.
+export function shadeGaps(gaps) {
   return (plot) => {
     const {ctx, bbox} = plot;
     ctx.save();
     ctx.fillStyle = theme('gap');
-    for (const [from, to] of gaps) {
+    for (const [from, to] of typeof gaps === 'function' ? gaps() : gaps) {
       const x0 = Math.max(plot.valToPos(from, 'x', true), bbox.left);
       const x1 = Math.min(plot.valToPos(to, 'x', true), bbox.left + bbox.width);
       if (x1 > bbox.left && x0 < bbox.left + bbox.width) ctx.fillRect(x0, bbox.top, Math.max(1, x1 - x0), bbox.height);
@@ -70,19 +58,19 @@ function shadeGaps(times, status) {
   };
 }
 
-function axis(label, more) {
+export function axis(label, more) {
   return Object.assign({
     label, stroke: theme('muted'), labelFont: '12px system-ui, sans-serif', font: '11px system-ui, sans-serif',
     labelSize: 18, labelGap: 0, grid: {stroke: theme('grid'), width: 1}, ticks: {stroke: theme('grid'), size: 4},
   }, more);
 }
 
-const yAxis = (label, more) => axis(label, Object.assign({
+export const yAxis = (label, more) => axis(label, Object.assign({
   size: 52, values: (plot, ticks) => ticks.map((v) => (v == null ? '' : String(+v.toPrecision(6)).replace('-', '−'))),
 }, more));
 
 // A line; `count` decides whether single points can be told apart.
-function line(label, colour, count, more) {
+export function line(label, colour, count, more) {
   return Object.assign({
     label, stroke: colour, width: 1.5, points: {show: count < 400, size: 4, fill: colour, stroke: colour},
     value: (plot, v) => short(v),
@@ -90,7 +78,7 @@ function line(label, colour, count, more) {
 }
 
 // Puts a plot into `parent`, as wide as it, and keeps it so. Returns the uPlot.
-function place(parent, options, data) {
+export function place(parent, options, data) {
   const width = () => Math.max(240, parent.clientWidth);
   const plot = new uPlot(Object.assign({width: width(), height: 210}, options), data, parent);
   const observer = new ResizeObserver(() => {
@@ -101,8 +89,12 @@ function place(parent, options, data) {
   return plot;
 }
 
-// One plot against time in a group. `series` without the time's own.
-function timePlot(parent, group, {label, series, bands, data, height = 210, scales, axes, drawUnder, drawOver}) {
+/**
+ * One plot against time in a group. `series` without the time's own.
+ * @param {{label: string, series: any[], data: any[], bands?: any, height?: number, scales?: any, axes?: any, drawUnder?: any, drawOver?: any}} what
+ */
+export function timePlot(parent, group, what) {
+  const {label, series, bands, data, height = 210, scales, axes, drawUnder, drawOver} = what;
   const options = {
     height,
     scales: Object.assign({x: {time: false}}, scales),
@@ -127,7 +119,7 @@ function timePlot(parent, group, {label, series, bands, data, height = 210, scal
 }
 
 // The frames' statuses as a strip of colours; the worse status wins a pixel.
-function statusStrip(parent, group, times, status) {
+export function statusStrip(parent, group, times, status) {
   const drawOver = (plot) => {
     const {ctx, bbox} = plot;
     ctx.save();
@@ -157,11 +149,8 @@ function statusStrip(parent, group, times, status) {
   });
 }
 
-// Dark grey is lost on a dark page.
-const statusColour = (i) => (i === 5 ? theme('text') : STATUSES[i].colour);
-
 // Error against distance: a point a frame, and the RMS of each bin as a step over it.
-function scatterPlot(parent, ranges, errors, bins) {
+export function scatterPlot(parent, ranges, errors, bins) {
   const order = ranges.map((r, i) => i).filter((i) => ranges[i] != null && errors[i] != null);
   order.sort((a, b) => ranges[a] - ranges[b]);
   const drawBins = (plot) => {

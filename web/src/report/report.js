@@ -1,26 +1,18 @@
 // Builds the report from the JSON in the page. Text goes in as text, never as HTML.
-'use strict';
+import {element, legend} from '../common/element.js';
+import {DEG, short} from '../common/format.js';
+import {STATES, STATUSES, isAngle} from '../common/names.js';
+import {theme} from '../common/theme.js';
+import {TimeGroup, gapsOf, line, scatterPlot, shadeGaps, statusStrip, timePlot} from '../views/plots.js';
+import {StatePlots} from '../views/state_plots.js';
+import {Scene} from '../views/scene.js';
 
-const DEG = 180 / Math.PI;
-const STATES = ['x', 'y', 'z', 'yaw', 'pitch', 'roll'];
-const isAngle = (i) => i >= 3;
 const shownScale = (i) => (isAngle(i) ? DEG : 100);  // rad to degrees, m to cm
 const shownUnit = (i) => (isAngle(i) ? '°' : 'cm');
 const withUnit = (number, i) => number + (isAngle(i) ? '°' : ' cm');
 
 // What the paper reached at 320 x 240 and about 1 m (its figure 3.5), cm and degrees.
 const PAPER_RMS = [4.9, 2.9, 3.6, 4.4, 3.3, 1.1];
-
-function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name === 'style') made.style.cssText = value;
-    else if (name.startsWith('on')) made.addEventListener(name.slice(2), value);
-    else if (value != null) made.setAttribute(name, value);
-  }
-  made.append(...children.filter((child) => child != null));
-  return made;
-}
 
 const percent = (fraction, digits = 1) => (fraction == null ? '–' : (100 * fraction).toFixed(digits) + ' %');
 const signed = (value) => (value > 0 ? '+' : '') + short(value);
@@ -40,23 +32,6 @@ function table(header, rows, attributes = {}) {
       element('thead', {}, element('tr', {}, ...header.map((h) => element('th', {scope: 'col'}, h)))),
       element('tbody', {}, ...rows.map((row) => element('tr', {}, ...row.map((cell, i) =>
           element(i ? 'td' : 'th', i ? {} : {scope: 'row'}, cell)))))));
-}
-
-function legend(items) {
-  return element('p', {class: 'legend'}, ...items.map(([swatch, words]) =>
-      element('span', {}, element('i', {style: swatch}), words)));
-}
-
-// Angles that pass +-180 degrees go on, so that no line crosses the whole plot: each is put next to `anchor`
-// where there is one, else next to the last.
-function unwrap(angles, anchor) {
-  let last = null;
-  return angles.map((angle, i) => {
-    if (angle == null) return null;
-    const near = anchor && anchor[i] != null ? anchor[i] : last;
-    last = near == null ? angle : angle + 360 * Math.round((near - angle) / 360);
-    return last;
-  });
 }
 
 // ---- the words and figures at the top ----
@@ -106,38 +81,36 @@ const WHY_NOT_COMPARED = {
 // ---- figures ----
 
 function statePlots(flight, group) {
-  const {frames, summary} = flight;
+  const {frames} = flight;
   const compared = frames.navigation.some((column) => column.some((v) => v != null));
-  const under = shadeGaps(frames.time_s, frames.status);
-  const grid = element('div', {class: 'six'});
-  for (let i = 0; i < 6; ++i) {
-    const parent = grid.appendChild(element('figure'));
-    let navigation = frames.navigation[i], vision = frames.vision[i];
-    if (isAngle(i)) {
-      navigation = unwrap(navigation);
-      vision = unwrap(vision, navigation);
-    }
-    const n = frames.time_s.length;
-    const value = (plot, v) => (v == null ? '–' : v.toFixed(isAngle(i) ? 2 : 3).replace('-', '−'));
-    const series = [line('vision', theme('vision'), n, {value})];
-    const data = [frames.time_s, vision];
-    if (compared) {
-      series.unshift(line('navigation', theme('navigation'), n, {width: 2, points: {show: false}, value}));
-      data.splice(1, 0, navigation);
-    }
-    flight.draw.push(() => timePlot(parent, group, {
-      label: `${STATES[i]} [${isAngle(i) ? '°' : 'm'}]`, series, data, drawUnder: under}));
-  }
+  // One sigma, as the ground station shows it; given in cm and degrees.
+  const sigma = frames.sigma_cm_deg.map((column, i) => column.map((s) => (s == null ? null : isAngle(i) ? s : s / 100)));
+  const plots = new StatePlots(group, {times: frames.time_s, vision: frames.vision, sigma,
+                                       navigation: compared ? frames.navigation : undefined, gaps: gapsOf(frames.time_s, frames.status)});
+  flight.draw.push(() => plots.draw());
   const note = (compared ? 'The paper’s figure 3.4. ' : '') + 'The body in the pad frame' +
       (compared ? ': vision over navigation. ' : ', by vision. ') + 'Shaded: frames without a pose. Drag to zoom all, double-click to see all again.';
   return section(compared ? 'Vision and navigation' : 'Vision', note,
-      legend([[`background:${'var(--vision)'}`, 'vision'], ...(compared ? [['background:var(--navigation)', 'navigation']] : []),
-              ['background:var(--gap);height:.8em', 'no pose']]), grid);
+      legend([[`background:${'var(--vision)'}`, 'vision'], ['background:var(--sigma);height:.8em', '± 1 σ'],
+              ...(compared ? [['background:var(--navigation)', 'navigation']] : []), ['background:var(--gap);height:.8em', 'no pose']]), plots.element);
+}
+
+// The way the vehicle came, as the ground station shows it.
+function flightScene(flight) {
+  const scene = new Scene();
+  const {vision} = flight.frames;
+  const trail = flight.frames.time_s.map((t, i) => [vision[0][i], vision[1][i], vision[2][i]]).filter((p) => p.every((v) => v != null));
+  scene.element.addEventListener('perch-remove', () => scene.dispose(), {once: true});
+  flight.draw.push(() => {
+    if (flight.pad) scene.setPad(flight.pad);
+    scene.show(trail.length ? {position: trail[trail.length - 1]} : null, trail);
+  });
+  return section('The way it came', 'In the pad frame, the vehicle where it was last. Drag to turn, wheel or pinch to zoom.', scene.element);
 }
 
 function residualPlots(flight, group) {
   const {frames} = flight;
-  const under = shadeGaps(frames.time_s, frames.status);
+  const under = shadeGaps(gapsOf(frames.time_s, frames.status));
   const grid = element('div', {class: 'six'});
   for (let i = 0; i < 6; ++i) {
     const parent = grid.appendChild(element('figure'));
@@ -225,7 +198,7 @@ function consistencyPlot(flight, group) {
   flight.draw.push(() => timePlot(parent, group, {
     label: 'NEES', height: 230,
     scales: {y: {distr: 3}},
-    drawUnder: shadeGaps(frames.time_s, frames.status),
+    drawUnder: shadeGaps(gapsOf(frames.time_s, frames.status)),
     series: [dashed('2.5 %', [2, 4]), dashed('97.5 %', [2, 4]), dashed('expected', [8, 4]),
              line('NEES', theme('vision'), frames.time_s.length)],
     data: [frames.time_s, constant(1.2373), constant(14.4494), constant(6), frames.nees.map((v) => (v > 0 ? v : null))],
@@ -279,7 +252,7 @@ function flightPage(flight, index) {
       element('p', {class: 'lead'}, inWords(summary)),
       compared ? null : element('p', {class: 'notice'}, WHY_NOT_COMPARED[summary.comparison] || `Nothing to compare with: ${summary.comparison}. Vision alone is shown.`),
       tiles(summary));
-  if (frames.time_s.length) page.append(statePlots(flight, group), detectionTimeline(flight, group));
+  if (frames.time_s.length) page.append(statePlots(flight, group), flightScene(flight), detectionTimeline(flight, group));
   if (compared) page.append(rmsBars(summary), errorTable(summary), residualPlots(flight, group), distances(flight));
   if (summary.consistency.mean_nees != null) page.append(consistencyPlot(flight, group));
   if (summary.stages.length) page.append(stageTable(summary));
@@ -300,9 +273,9 @@ function overview(flights, choose) {
 }
 
 function main() {
-  const root = document.getElementById('report');
+  const root = /** @type {HTMLElement} */ (document.getElementById('report'));
   const sources = [...document.querySelectorAll('script.flight')];
-  const configuration = JSON.parse(document.getElementById('configuration').textContent);
+  const configuration = JSON.parse(document.getElementById('configuration')?.textContent ?? 'null');
   const parsed = sources.map((source) => JSON.parse(source.textContent));
   root.append(element('header', {}, element('h1', {}, 'Perch flight report')));
   const place = element('div');
@@ -310,7 +283,7 @@ function main() {
 
   const show = (index) => {
     shown = index;
-    place.querySelectorAll('figure').forEach((figure) => figure.dispatchEvent(new Event('perch-remove')));
+    place.querySelectorAll('figure, .scene').forEach((figure) => figure.dispatchEvent(new Event('perch-remove')));
     const flight = parsed[index];
     place.replaceChildren(flightPage(flight, index));
     for (const draw of flight.draw) draw();
