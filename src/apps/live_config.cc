@@ -57,6 +57,7 @@ LiveConfig read_live_config(Section root) {
   config.mavlink = mavlink::read_mavlink_options(outputs);
   config.mavlink.link.gimbal = config.run.frames.pan_tilt.has_value();
   read_record(outputs, config);
+  config.station = read_station_options(outputs);
   if (is_replay(config)) {
     // What was seen then must not steer a vehicle now, and is recorded already.
     config.mavlink.send = false;

@@ -8,6 +8,7 @@
 #include "perch/estimator/run_config.h"
 #include "perch/links/mavlink/mavlink_options.h"
 #include "perch/links/stream_url.h"
+#include "perch/station/station_options.h"
 
 namespace perch {
 
@@ -27,6 +28,7 @@ struct LiveConfig {
   std::optional<PtzOptions> ptz;  // a head that turns the camera
   std::filesystem::path record;   // outputs.record; empty: nothing is recorded
   std::string record_format = "png";
+  StationOptions station;
 };
 
 // Of a replay `nav: mavlink+URL` means what the flight has recorded of it: the configuration of the live run

@@ -8,7 +8,9 @@
 #include <memory>
 #include <thread>
 
+#include "live_recording.h"
 #include "live_run.h"
+#include "live_station.h"
 #include "perch/config/atomic_file.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/flight_recorder.h"
@@ -104,8 +106,9 @@ Opened open(const fs::path& file, std::vector<std::string> overrides) {
   return {config, root.resolved(), std::move(source)};
 }
 
-std::unique_ptr<FlightRecorder> make_recorder(const Opened& opened) {
-  if (opened.config.record.empty()) return nullptr;
+// What makes a recorder of this run; empty: nothing is to be recorded.
+LiveRecording::Make recorder_maker(const Opened& opened) {
+  if (opened.config.record.empty()) return {};
   RecorderOptions options;
   options.folder = opened.config.record;
   options.format = opened.config.record_format;
@@ -114,17 +117,21 @@ std::unique_ptr<FlightRecorder> make_recorder(const Opened& opened) {
   if (frames.body_from_base && !frames.pan_tilt)
     body_from_camera = *frames.body_from_base * base_from_camera(frames, HeadAngles{});
   const double rate_hz = opened.config.run.live.rate_hz > 0 ? opened.config.run.live.rate_hz : 30;
-  return std::make_unique<FlightRecorder>(options, opened.source.camera, opened.resolved, body_from_camera,
-                                          rate_hz);
+  return [=, camera = opened.source.camera, resolved = opened.resolved] {
+    return std::make_unique<FlightRecorder>(options, camera, resolved, body_from_camera, rate_hz);
+  };
 }
 
-LinkTap tap_of(FlightRecorder* recorder) {
-  if (!recorder) return {};
+LinkTap tap_of(LiveRecording& recording, LiveStation* station) {
   using Direction = FlightRecorder::Direction;
-  return {[recorder](bool incoming, int64_t ns, std::span<const uint8_t> bytes) {
-            recorder->add_bytes(incoming ? Direction::kIn : Direction::kOut, ns, bytes);
+  return {[&recording](bool incoming, int64_t ns, std::span<const uint8_t> bytes) {
+            if (const auto recorder = recording.recorder())
+              recorder->add_bytes(incoming ? Direction::kIn : Direction::kOut, ns, bytes);
           },
-          [recorder](const NavSample& sample) { recorder->add_navigation(sample); }};
+          [&recording, station](const NavSample& sample) {
+            if (const auto recorder = recording.recorder()) recorder->add_navigation(sample);
+            if (station) station->hear(sample);
+          }};
 }
 
 nlohmann::ordered_json recording_json(const FlightRecorder& recorder) {
@@ -137,28 +144,37 @@ nlohmann::ordered_json recording_json(const FlightRecorder& recorder) {
 // The program's log, as it is on stderr, into the recording.
 class RecordedLog : public google::LogSink {
  public:
-  explicit RecordedLog(FlightRecorder& recorder) : recorder_(recorder) { google::AddLogSink(this); }
+  explicit RecordedLog(const LiveRecording& recording) : recording_(recording) { google::AddLogSink(this); }
   ~RecordedLog() override { google::RemoveLogSink(this); }
   void send(google::LogSeverity severity, const char*, const char* file, int line,
             const google::LogMessageTime& time, const char* message, size_t length) override {
-    recorder_.add_log(ToString(severity, file, line, time, message, length));
+    if (const auto recorder = recording_.recorder()) {
+      recorder->add_log(ToString(severity, file, line, time, message, length));
+    }
   }
 
  private:
-  FlightRecorder& recorder_;
+  const LiveRecording& recording_;
 };
 
 // Looks after a run: what changes is said once, how it goes every 10 s.
 class Supervisor {
  public:
-  Supervisor(LiveRun& run, FlightRecorder* recorder, const Supervision& supervision)
-      : run_(run), recorder_(recorder), supervision_(supervision), begin_ns_(monotonic_ns()) {}
+  Supervisor(LiveRun& run, LiveRecording& recording, LiveStation* station, const Supervision& supervision)
+      : run_(run),
+        recording_(recording),
+        station_(station),
+        supervision_(supervision),
+        begin_ns_(monotonic_ns()) {}
 
   void watch() {
     manager_.ready(std::string(name_of(told_state_)));
     while (!supervision_.stop && !run_.finished() && !over()) {
       std::this_thread::sleep_for(kLook);
       say_changes();
+      if (station_) {
+        for (const std::string& what : station_->look_after(run_, recording_)) event(what);
+      }
       feed_watchdog();
       if (monotonic_ns() - last_log_ns_ > kLogEvery) say_how_it_goes();
     }
@@ -173,7 +189,8 @@ class Supervisor {
 
   void event(const std::string& what) {
     LOG(INFO) << what;
-    if (recorder_) recorder_->add_event(monotonic_ns(), what);
+    if (const auto recorder = recording_.recorder()) recorder->add_event(monotonic_ns(), what);
+    if (station_) station_->tell_event(what);
   }
 
   void say_changes() {
@@ -210,8 +227,8 @@ class Supervisor {
                        std::to_string(run_.frames().of(EstimateStatus::kOk)) + " of " +
                        std::to_string(run_.frames().all()) + " frames with a pose";
     if (run_.link()) line += "; " + run_.link()->status();
-    if (recorder_) {
-      const auto counters = recorder_->counters();
+    if (const auto recorder = recording_.recorder()) {
+      const auto counters = recorder->counters();
       line += "; recorded " + std::to_string(counters.frames_written) + ", dropped " +
               std::to_string(counters.frames_dropped);
     }
@@ -220,7 +237,8 @@ class Supervisor {
   }
 
   LiveRun& run_;
-  FlightRecorder* recorder_;
+  LiveRecording& recording_;
+  LiveStation* station_;
   const Supervision& supervision_;
   ServiceManager manager_;
   const int64_t begin_ns_;
@@ -236,17 +254,21 @@ class Supervisor {
 int supervise(const fs::path& file, const std::vector<std::string>& overrides,
               const Supervision& supervision) {
   Opened opened = open(file, overrides);
-  const auto recorder = make_recorder(opened);
-  std::optional<RecordedLog> log;
-  if (recorder) log.emplace(*recorder);
+  LiveRecording recording(recorder_maker(opened));
+  const RecordedLog log(recording);
+  std::optional<LiveStation> station;
+  if (opened.config.station.on) station.emplace(opened.config, opened.source);
+  LiveStation* const watched = station ? &*station : nullptr;
+  if (watched) LOG(INFO) << "station: port " << watched->port();
   std::optional<EstimateFiles> files;
   if (!supervision.output.empty()) files.emplace(supervision.output);
   const auto on_estimate = [&](const Frame& frame, const Estimator::Aid& aid, const Estimate& estimate) {
-    if (recorder) recorder->add_frame(frame, aid, estimate);
+    if (const auto recorder = recording.recorder()) recorder->add_frame(frame, aid, estimate);
+    if (watched) watched->see(frame, aid, estimate);
     if (files) files->add(estimate);
   };
-  LiveRun run(opened.config, std::move(opened.source), tap_of(recorder.get()), on_estimate);
-  Supervisor supervisor(run, recorder.get(), supervision);
+  LiveRun run(opened.config, std::move(opened.source), tap_of(recording, watched), on_estimate);
+  Supervisor supervisor(run, recording, watched, supervision);
   supervisor.watch();
   run.stop();
   if (files) files->commit();
@@ -256,6 +278,8 @@ int supervise(const fs::path& file, const std::vector<std::string>& overrides,
   summary.update(run.summary());
   summary["cpu_s"]["process"] = process_cpu_seconds();
   summary["peak_memory_bytes"] = peak_memory_bytes();
+  if (watched) summary["station"] = watched->summary();
+  const auto recorder = recording.recorder();
   if (recorder) summary["recording"] = recording_json(*recorder);
   const std::string text = summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (!supervision.summary.empty()) write_whole_file(supervision.summary, text);

@@ -1,0 +1,46 @@
+#include "live_recording.h"
+
+#include <utility>
+
+namespace perch {
+
+std::string LiveRecording::start() {
+  if (!make_) return "record: outputs.record names no folder";
+  if (recorder()) return "record: it is recording";
+  try {
+    std::shared_ptr<FlightRecorder> made = make_();
+    const std::string folder = made->folder().filename().string();
+    const std::lock_guard lock(mutex_);
+    recorder_ = std::move(made);
+    return "recording " + folder;
+  } catch (const std::exception& e) {
+    return std::string("record: ") + e.what();
+  }
+}
+
+std::string LiveRecording::stop() {
+  std::shared_ptr<FlightRecorder> stopped;
+  {
+    const std::lock_guard lock(mutex_);
+    stopped.swap(recorder_);
+  }
+  if (!stopped) return "stop: nothing is recording";
+  stopped->close();
+  return "recorded " + stopped->folder().filename().string() + ": " +
+         std::to_string(stopped->counters().frames_written) + " pictures";
+}
+
+nlohmann::json LiveRecording::status() const {
+  const auto current = recorder();
+  if (!current) return {{"on", false}, {"possible", static_cast<bool>(make_)}};
+  const auto counters = current->counters();
+  return {{"on", true},
+          {"possible", true},
+          {"folder", current->folder().filename().string()},
+          {"frames", counters.frames_written},
+          {"dropped", counters.frames_dropped},
+          {"disk_left", counters.disk_left},
+          {"problem", counters.last_problem}};
+}
+
+}  // namespace perch
