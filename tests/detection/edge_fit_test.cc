@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 
@@ -16,14 +17,24 @@ constexpr int kSize = 160;
 
 struct Bands {
   double angle = 0.3, phase = 0;  // of the stripes
+  int width = 24;                 // of them, px
   double blur = 0.75;             // px
   double slope = 0;               // of the light, a px
+  double shade = 1;               // what a shadow leaves of it beside the middle
+  double shadow_angle = 0;        // of its edge, 8 px wide
   double noise = 0;               // grey levels
 };
 
-// White and black stripes 24 px wide, their edges at phase + 24 k along the direction of `angle`.
+// White and black stripes, their edges at phase + width k along the direction of `angle`.
 double distance(const Bands& b, double x, double y) {
   return std::cos(b.angle) * (x - kSize / 2) + std::sin(b.angle) * (y - kSize / 2) - b.phase;
+}
+
+// 1 in the light, `shade` in the shadow.
+double in_shadow(const Bands& b, const Eigen::Vector2d& p) {
+  const double out =
+      std::cos(b.shadow_angle) * (p.x() - kSize / 2) + std::sin(b.shadow_angle) * (p.y() - kSize / 2);
+  return b.shade + (1 - b.shade) * std::clamp(out / 8 + 0.5, 0.0, 1.0);
 }
 
 cv::Mat paint(const Bands& b, TestRng& rng) {
@@ -32,11 +43,12 @@ cv::Mat paint(const Bands& b, TestRng& rng) {
     for (int x = 0; x < kSize; ++x) {
       const double d = distance(b, x, y);
       double white = 0;
-      for (int k = -6; k <= 6; k += 2) {
-        white += 0.5 * (std::erf((d - 24 * k) / b.blur / M_SQRT2) -
-                        std::erf((d - 24 * (k + 1)) / b.blur / M_SQRT2));
+      const int most = 2 * (72 / b.width);
+      for (int k = -most; k <= most; k += 2) {
+        white += 0.5 * (std::erf((d - b.width * k) / b.blur / M_SQRT2) -
+                        std::erf((d - b.width * (k + 1)) / b.blur / M_SQRT2));
       }
-      const double light = 1 + b.slope * (x - kSize / 2);
+      const double light = (1 + b.slope * (x - kSize / 2)) * in_shadow(b, {x, y});
       const double level = light * (20 + 120 * white) + rng.normal(b.noise) + rng.uniform(-0.5, 0.5);
       picture.at<uint8_t>(y, x) = static_cast<uint8_t>(std::clamp(std::lround(level), 0L, 255L));
     }
@@ -44,19 +56,22 @@ cv::Mat paint(const Bands& b, TestRng& rng) {
   return picture;
 }
 
-// Pieces on the edges of the five middle stripes, expected `off` px from where they are.
+// Pieces on the edges of the middle stripes (five of 24 px), each as long as a stripe is wide, expected `off`
+// px from where they are.
 std::vector<EdgePiece> pieces_of(const Bands& b, double off) {
   std::vector<EdgePiece> pieces;
   const Eigen::Vector2d n(std::cos(b.angle), std::sin(b.angle)), along(-n.y(), n.x());
-  for (int k = -2; k <= 2; ++k) {
-    for (int part = -1; part <= 1; ++part) {
+  const int stripes = 48 / b.width, parts = 24 / b.width;
+  for (int k = -stripes; k <= stripes; ++k) {
+    for (int part = -parts; part <= parts; ++part) {
       EdgePiece p;
-      p.middle = Eigen::Vector2d::Constant(kSize / 2) + (b.phase + 24 * k + off) * n + 24 * part * along;
-      p.begin = p.middle - 12 * along;
-      p.end = p.middle + 12 * along;
+      p.middle =
+          Eigen::Vector2d::Constant(kSize / 2) + (b.phase + b.width * k + off) * n + b.width * part * along;
+      p.begin = p.middle - 0.5 * b.width * along;
+      p.end = p.middle + 0.5 * b.width * along;
       p.normal = k % 2 == 0 ? n : Eigen::Vector2d(-n);  // towards white
       p.gradient = p.normal;
-      p.white_room = p.black_room = 24;
+      p.white_room = p.black_room = b.width;
       pieces.push_back(p);
     }
   }
@@ -64,7 +79,7 @@ std::vector<EdgePiece> pieces_of(const Bands& b, double off) {
 }
 
 struct Errors {
-  double rms = 0, mean = 0, chi_square = 0;
+  double rms = 0, mean = 0, chi_square = 0, median_px = 0;  // the median as a deviation
   size_t count = 0;
 };
 
@@ -75,9 +90,11 @@ Errors measure(Bands b, double expected_blur, int pictures) {
   std::vector<EdgeOffset> offsets;
   std::vector<int> measured;
   Errors errors;
+  std::vector<double> sizes;
   for (int i = 0; i < pictures; ++i) {
     b.angle = rng.uniform(-3, 3);
     b.phase = rng.uniform(-12, 12);
+    b.shadow_angle = rng.uniform(-3, 3);
     const double off = rng.uniform(-0.4, 0.4);
     const auto pieces = pieces_of(b, off);
     const std::vector<uint8_t> on_ground(pieces.size(), 0);
@@ -89,6 +106,7 @@ Errors measure(Bands b, double expected_blur, int pictures) {
       errors.rms += error * error;
       errors.mean += error;
       errors.chi_square += std::pow(error / offsets[k].sigma, 2);
+      sizes.push_back(std::abs(error));
       ++errors.count;
     }
   }
@@ -96,6 +114,8 @@ Errors measure(Bands b, double expected_blur, int pictures) {
   errors.rms = std::sqrt(errors.rms / n);
   errors.mean /= n;
   errors.chi_square /= n;
+  std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));
+  errors.median_px = 1.4826 * sizes[sizes.size() / 2];
   return errors;
 }
 
@@ -128,6 +148,18 @@ TEST(EdgeFit, ABlurThatIsExpectedWrongShiftsNothing) {
     EXPECT_LT(std::abs(errors.mean), 0.001) << expected;
     EXPECT_LT(errors.rms, std::abs(expected - 0.75) > 0.03 ? 0.02 : 2 * bound(0.5, 120, 0.75, 24))
         << expected;
+  }
+}
+
+// The light on both sides is even: a surface through both would take its fall for one of the light at each
+// edge, and move all of them to the same side by hundredths of a pixel. What lies in the shadow's soft edge
+// is moved, and says so.
+TEST(EdgeFit, AShadowShiftsNothing) {
+  for (const double shade : {0.3, 0.6}) {
+    const Errors errors = measure({.width = 12, .shade = shade, .noise = 1}, 0.75, 30);
+    ASSERT_GT(errors.count, 1000U);
+    // Half of the pieces are brighter than that, but a few levels must do for two surfaces.
+    EXPECT_LT(errors.median_px, 2 * bound(1, shade * 120, 0.75, 12)) << shade;
   }
 }
 

@@ -128,14 +128,21 @@ bool fit_lines(const cv::Mat& grey, const CrossingLines& lines, int step, const 
   return solve(sums, piece);
 }
 
-// A level, `half` a contrast above the middle of the step, as far as the piece's own does not speak against
-// it: one in the shadow that others are not has its own.
-LevelSurface::Level believed(const EdgeFit::Piece& piece, const LevelSurface::Level& level, double half) {
-  constexpr double kDeviations = 4;
+// The level `half` a contrast above the middle of the step, as far as the piece's own does not speak against
+// it. One that is off lies in glare, dirt or the soft edge of a shadow, and has its own; that changes within
+// a few pixels.
+LevelSurface::Level believed(const EdgeFit::Piece& piece, const LevelSurface& surface,
+                             const Eigen::Vector2d& pixel, double half) {
+  constexpr double kDeviations = 4, kSoftEdge = 5;  // px
   const Eigen::Vector3d u(1, half, 0);
+  const double own = u.dot(piece.own);
+  const LevelSurface::Level level = surface.at(pixel, own);
   const double variance = level.variance + piece.variance * u.dot(piece.inverse * u);
-  const double off = u.dot(piece.own) - level.value;
-  return off * off > kDeviations * kDeviations * variance ? LevelSurface::Level{} : level;
+  const double off = std::abs(own - level.value);
+  if (off * off <= kDeviations * kDeviations * variance) return level;
+  LevelSurface::Level unknown;
+  unknown.gradient_sigma = off / kSoftEdge;
+  return unknown;
 }
 
 struct Step {
@@ -162,7 +169,12 @@ Step solve(const EdgeFit::Piece& piece, const LevelSurface::Level& white, const 
   hold(black, -0.5 * piece.sign());
   const Eigen::Matrix3d covariance = information.inverse();
   const Eigen::Vector3d x = covariance * right;
-  return {piece.offset_of(x), std::sqrt(covariance(2, 2)) / std::abs(x(1)), std::abs(x(1))};
+  // A gradient that is not known goes into the offset as those do that are.
+  const Eigen::Vector3d by_gradient(piece.xt, 0, piece.by_w(1));
+  const double of_gradient = covariance.row(2).dot(by_gradient) / piece.variance *
+                             std::hypot(white.gradient_sigma, black.gradient_sigma);
+  const double sigma = std::sqrt(covariance(2, 2) + of_gradient * of_gradient);
+  return {piece.offset_of(x), sigma / std::abs(x(1)), std::abs(x(1))};
 }
 
 }  // namespace
@@ -277,10 +289,10 @@ void EdgeFit::measure(const cv::Mat& grey, std::span<const EdgePiece> pieces,
     const EdgePiece& piece = pieces[static_cast<size_t>(p.index)];
     LevelSurface::Level white, black;
     if (options.share_levels) {
-      white = believed(p, white_.at(piece.middle), 0.5 * p.sign());
+      white = believed(p, white_, piece.middle, 0.5 * p.sign());
       // Of the ground nothing is known.
       const bool of_ground = on_ground[static_cast<size_t>(p.index)] != 0;
-      if (!of_ground) black = believed(p, black_.at(piece.middle), -0.5 * p.sign());
+      if (!of_ground) black = believed(p, black_, piece.middle, -0.5 * p.sign());
     }
     const Step step = solve(p, white, black);
     if (!(std::abs(step.offset) < 0.5) || !std::isfinite(step.sigma)) continue;
