@@ -107,7 +107,7 @@ bool fit_lines(const cv::Mat& grey, const CrossingLines& lines, int step, const 
   uint8_t column[StepTemplates::kPixels];
   for (int at = std::max(lines.first(), 0); at <= std::min(lines.last(), count - 1); at += step) {
     const double crossing = lines.crossing(at) + piece.shift;
-    const int middle = static_cast<int>(std::floor(crossing + 0.5));
+    const int middle = cvRound(crossing);
     const int begin = middle - pixels / 2;
     if (begin < 0 || begin + pixels > width) continue;
     sums.part += lines.part(at);
@@ -184,8 +184,7 @@ EdgeFit::~EdgeFit() = default;
 
 bool EdgeFit::fit(const cv::Mat& grey, const EdgePiece& piece, const FitOptions& options,
                   Piece& fitted) const {
-  const CrossingLines untrimmed(piece, 0);
-  const double cosine = std::abs(untrimmed.along_normal()), sine = std::sqrt(1 - cosine * cosine);
+  const double cosine = piece.normal.cwiseAbs().maxCoeff(), sine = piece.normal.cwiseAbs().minCoeff();
   // Up to where the next edge's blur begins, and not farther than the step's own reaches.
   const double room = std::min(piece.white_room, piece.black_room) - 2 * options.blur;
   const double reach = std::min(std::min(room, kLevel * options.blur) / cosine, kLargestReach);

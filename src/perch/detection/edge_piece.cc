@@ -34,10 +34,15 @@ void project_edges(const TargetEdges& target, const Eigen::Matrix3d& image_from_
   const auto in_picture = [&](const Eigen::Vector2d& p) {
     return p.x() >= 0 && p.y() >= 0 && p.x() <= camera.width() - 1 && p.y() <= camera.height() - 1;
   };
+  std::optional<Seen> last_end;
   for (size_t i = 0; i < target.edges.size(); ++i) {
     const TargetEdge& edge = target.edges[i];
     const auto at = [&](double t) -> Eigen::Vector2d { return edge.from + t * (edge.to - edge.from); };
-    const auto from = see(H, camera, edge.from, nullptr), to = see(H, camera, edge.to, nullptr);
+    // Around a shape each edge begins where the last one ended.
+    const bool goes_on = i > 0 && target.edges[i - 1].to == edge.from;
+    const auto from = goes_on ? last_end : see(H, camera, edge.from, nullptr);
+    const auto to = see(H, camera, edge.to, nullptr);
+    last_end = to;
     // An end that the lens cannot show: its edge is cut by the picture's edge and seen in pieces.
     const double length = from && to ? (to->pixel - from->pixel).norm() : 8 * std::min(longest, 100.0);
     int count = static_cast<int>(std::ceil(length / longest));

@@ -1,7 +1,6 @@
 #include "perch/detection/edge_search.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
@@ -15,37 +14,37 @@ struct Step {
   double contrast = 0, slope = 0;
 };
 
+// A line of the picture, of every `step`-th byte from its middle pixel.
+struct Line {
+  const uint8_t* middle;
+  std::ptrdiff_t step;
+  int operator[](int i) const { return middle[i * step]; }
+};
+
 // The steepest rise of `sign` times the grey values of a line of 2 n + 1 pixels, n - 1 from its middle at
 // most.
-std::optional<Step> steepest(const std::array<int, 2 * kMaxRadius + 5>& line, int n, int sign, int levels) {
-  const auto slope = [&](int i) {
-    return sign * (line[static_cast<size_t>(i + 1)] - line[static_cast<size_t>(i - 1)]);
-  };
-  int best = -1, most = 0;
-  for (int i = 1; i < 2 * n; ++i) {
-    // Of equals the nearer one.
-    if (slope(i) > most || (slope(i) == most && std::abs(i - n) < std::abs(best - n))) {
-      most = slope(i);
-      best = i;
-    }
+std::optional<Step> steepest(const Line& line, int n, int sign, int levels) {
+  const auto slope = [&](int i) { return sign * (line[i + 1] - line[i - 1]); };
+  // From the middle outwards: of equals the nearer one, on the left before the right.
+  int best = 0, most = slope(0);
+  for (int i = 1; i < n; ++i) {
+    const int left = slope(-i), right = slope(i);
+    if (left > most) most = left, best = -i;
+    if (right > most) most = right, best = i;
   }
-  if (best < 0 || most < levels) return std::nullopt;
+  if (most <= 0 || most < levels) return std::nullopt;
   Step step;
-  step.at = best - n;
+  step.at = best;
   step.slope = 0.5 * most;
-  if (best > 1 && best < 2 * n - 1) {
+  if (std::abs(best) < n - 1) {
     const double before = slope(best - 1), after = slope(best + 1), bend = 2 * most - before - after;
     if (bend > 0) step.at += std::clamp(0.5 * (after - before) / bend, -0.5, 0.5);
   }
   // The levels on both sides: as far as the grey goes on rising.
   int low = best - 1, high = best + 1;
-  while (low > 0 && low > best - 4 &&
-         sign * (line[static_cast<size_t>(low)] - line[static_cast<size_t>(low - 1)]) > 0)
-    --low;
-  while (high < 2 * n && high < best + 4 &&
-         sign * (line[static_cast<size_t>(high + 1)] - line[static_cast<size_t>(high)]) > 0)
-    ++high;
-  step.contrast = sign * (line[static_cast<size_t>(high)] - line[static_cast<size_t>(low)]);
+  while (low > -n && low > best - 4 && sign * (line[low] - line[low - 1]) > 0) --low;
+  while (high < n && high < best + 4 && sign * (line[high + 1] - line[high]) > 0) ++high;
+  step.contrast = sign * (line[high] - line[low]);
   return step;
 }
 
@@ -57,7 +56,6 @@ void search_edges(const cv::Mat& grey, std::span<const EdgePiece> pieces, const 
   offsets.clear();
   steps.clear();
   for (EdgeTally& tally : tallies) tally = {};
-  std::array<int, 2 * kMaxRadius + 5> line{};
   for (const EdgePiece& piece : pieces) {
     if (piece.edge >= static_cast<int>(tallies.size())) tallies.resize(static_cast<size_t>(piece.edge) + 1);
     EdgeTally& tally = tallies[static_cast<size_t>(piece.edge)];
@@ -76,13 +74,9 @@ void search_edges(const cv::Mat& grey, std::span<const EdgePiece> pieces, const 
       if (at < 0 || at >= (lines.rows() ? grey.rows : grey.cols)) continue;
       if (middle < n || middle + n >= (lines.rows() ? grey.cols : grey.rows)) continue;
       ++tally.asked;
-      if (lines.rows()) {
-        const uint8_t* pixel = grey.ptr<uint8_t>(at) + middle - n;
-        for (int i = 0; i <= 2 * n; ++i) line[static_cast<size_t>(i)] = pixel[i];
-      } else {
-        const uint8_t* pixel = grey.ptr<uint8_t>(middle - n) + at;
-        for (int i = 0; i <= 2 * n; ++i, pixel += grey.step[0]) line[static_cast<size_t>(i)] = *pixel;
-      }
+      const Line line = lines.rows()
+                            ? Line{grey.ptr<uint8_t>(at) + middle, 1}
+                            : Line{grey.ptr<uint8_t>(middle) + at, static_cast<std::ptrdiff_t>(grey.step[0])};
       const int sign = lines.along_normal() > 0 ? 1 : -1;
       const auto step = steepest(line, n, sign, static_cast<int>(0.5 * options.contrast));
       if (!step || step->contrast < options.contrast) continue;

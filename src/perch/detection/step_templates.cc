@@ -44,28 +44,25 @@ StepTemplates::StepTemplates(double sigma, double reach) : reach_(reach), templa
   }
 }
 
-const StepTemplates::Template& StepTemplates::at(double* phase) const {
-  const int k = std::clamp(static_cast<int>((*phase + 0.5) * kPhases + 0.5), 0, kPhases);
-  *phase = static_cast<double>(k) / kPhases - 0.5;
-  return templates_[static_cast<size_t>(k)];
-}
-
 StepTemplateTable::StepTemplateTable() {
   double sigma = kSmallestBlur;
   for (int i = 0; i < kBlurs; ++i, sigma *= kBlurRatio) {
     for (const double reach : kReaches) templates_.emplace_back(sigma, reach);
+    sigmas_.push_back(sigma);
   }
 }
 
 const StepTemplates& StepTemplateTable::of(double reach, double* sigma) const {
-  const double steps = std::log(std::max(*sigma, kSmallestBlur) / kSmallestBlur) / std::log(kBlurRatio);
-  const int blur = std::clamp(static_cast<int>(std::lround(steps)), 0, kBlurs - 1);
-  *sigma = kSmallestBlur * std::pow(kBlurRatio, blur);
+  // The nearest in their logarithms.
+  static const double half_step = std::sqrt(kBlurRatio);
+  size_t blur = 0;
+  while (blur + 1 < sigmas_.size() && *sigma > half_step * sigmas_[blur]) ++blur;
+  *sigma = sigmas_[blur];
   int r = 0;
   for (int k = 1; k < static_cast<int>(std::size(kReaches)); ++k) {
     if (reach >= kReaches[k]) r = k;
   }
-  return templates_[static_cast<size_t>(blur) * std::size(kReaches) + static_cast<size_t>(r)];
+  return templates_[blur * std::size(kReaches) + static_cast<size_t>(r)];
 }
 
 }  // namespace perch

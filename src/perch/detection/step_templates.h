@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -28,7 +29,11 @@ class StepTemplates {
   StepTemplates(double sigma, double reach);
 
   // Of a step `phase` px from the middle pixel, -1/2 .. 1/2; `phase` is replaced by what the template has.
-  const Template& at(double* phase) const;
+  const Template& at(double* phase) const {
+    const int k = std::clamp(static_cast<int>((*phase + 0.5) * kPhases + 0.5), 0, kPhases);
+    *phase = static_cast<double>(k) / kPhases - 0.5;
+    return templates_[static_cast<size_t>(k)];
+  }
   double reach() const { return reach_; }
 
  private:
@@ -45,6 +50,7 @@ class StepTemplateTable {
 
  private:
   std::vector<StepTemplates> templates_;
+  std::vector<double> sigmas_;  // of their blurs, rising
 };
 
 }  // namespace perch

@@ -53,9 +53,11 @@ bool PlaneCost::operator()(const double* parameters, double* residuals, double* 
     f.setConstant(1e6);
     return false;
   }
-  f = root_ * step_of(N / N(2, 2) - Eigen::Matrix3d::Identity());
+  // By coefficients: Eigen's product for large matrices takes thrice as long for these.
+  f = root_.lazyProduct(step_of(N / N(2, 2) - Eigen::Matrix3d::Identity()));
   if (!jacobian) return true;
   Eigen::Map<Jacobian> J(jacobian);
+  Jacobian by_x;
   const Eigen::Matrix3d left = so3_left_jacobian(x.tail<3>());
   for (int i = 0; i < 6; ++i) {
     Eigen::Matrix3d by_i = Eigen::Matrix3d::Zero();
@@ -67,8 +69,9 @@ bool PlaneCost::operator()(const double* parameters, double* residuals, double* 
       by_i.col(1) = axis.cross(R.col(1));
     }
     const Eigen::Matrix3d dN = from_image_ * by_i * to_frame_;
-    J.col(i) = root_ * step_of((dN - N * (dN(2, 2) / N(2, 2))) / N(2, 2));
+    by_x.col(i) = step_of((dN - N * (dN(2, 2) / N(2, 2))) / N(2, 2));
   }
+  J = root_.lazyProduct(by_x);
   return true;
 }
 
