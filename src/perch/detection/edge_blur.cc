@@ -47,4 +47,6 @@ Eigen::Matrix2d fit_blur(std::span<const WidthSample> samples, double expected_p
   return C;
 }
 
+double texture_together(double blur_px2) { return 2 * M_PI * M_SQRT2 * blur_px2; }
+
 }  // namespace perch

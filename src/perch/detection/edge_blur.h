@@ -17,4 +17,9 @@ struct WidthSample {
 // samples agree in it.
 Eigen::Matrix2d fit_blur(std::span<const WidthSample> samples, double expected_px);
 
+// As how many pixels together those of a textured ground count, where an edge is fitted to them: through the
+// blur, by its mean square in px^2, they err alike. 2 sqrt(pi) sigma along the edge; across it, seen with a
+// blurred step's slope, sqrt(2 pi) sigma.
+double texture_together(double blur_px2);
+
 }  // namespace perch

@@ -91,10 +91,10 @@ bool solve(const Sums& s, EdgeFit::Piece& piece) {
   piece.narrower = own > 1e-3 * s.ww ? left / own : 0;
   piece.own = piece.inverse * piece.b - by_narrower * piece.narrower;
   if (!piece.own.allFinite()) return false;
-  // Rounding to whole grey levels is a twelfth at least, however small the residuals of a few.
+  // That of rounding to whole grey levels at least, however small the residuals of a few.
   const double explained = piece.b.dot(piece.own) + iw * piece.narrower;
   const double residual = std::max(0.0, cv::v_reduce_sum(s.ii) - explained);
-  piece.variance = (residual + 4 * 1.0) / static_cast<double>(s.n) + 1.0 / 12;
+  piece.variance = std::max((residual + 4 * 1.0) / static_cast<double>(s.n), 1.0 / 12);
   return true;
 }
 
@@ -253,10 +253,9 @@ void EdgeFit::find_blur(std::span<const EdgePiece> pieces, double expected_px) {
   blur_ = fit_blur(widths_, expected_px);
 }
 
-// What a textured ground adds to the residuals is not noise of single pixels: through the blur, those of an
-// area of 4 pi sigma^2 px go together, seven at least.
+// What a textured ground adds to the residuals is not noise of single pixels.
 void EdgeFit::widen_on_ground(std::span<const uint8_t> on_ground) {
-  constexpr double kTogether = 7;
+  const double together = std::max(texture_together(0.5 * blur_.trace()), 1.0);
   variances_.clear();
   for (const Piece& p : fitted_) {
     if (!on_ground[static_cast<size_t>(p.index)]) variances_.push_back(p.variance);
@@ -266,7 +265,7 @@ void EdgeFit::widen_on_ground(std::span<const uint8_t> on_ground) {
   std::ranges::nth_element(variances_, middle);
   for (Piece& p : fitted_) {
     if (on_ground[static_cast<size_t>(p.index)])
-      p.variance += (kTogether - 1) * std::max(0.0, p.variance - *middle);
+      p.variance += (together - 1) * std::max(0.0, p.variance - *middle);
   }
 }
 

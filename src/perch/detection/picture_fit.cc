@@ -7,6 +7,7 @@
 #include <opencv2/core/hal/intrin.hpp>
 
 #include "perch/detection/confirm.h"
+#include "perch/detection/edge_blur.h"
 
 namespace perch {
 namespace {
@@ -14,9 +15,6 @@ namespace {
 constexpr int kUnknowns = PictureRow::kUnknowns, kColumns = PictureRow::kColumns;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
-
-// Of the texture of a ground, pixels of an area go together through the blur: 4 pi sigma^2.
-constexpr double kTogether = 7;
 
 // Cauchy's loss in deviations: 95 % efficient on Gaussian noise.
 constexpr double kCauchy = 2.4;
@@ -86,7 +84,7 @@ PictureFit::Pass PictureFit::take(const cv::Mat& grey, const Noise& noise, bool 
       }
       const double r = static_cast<double>(row.d[PictureRow::kResidual]),
                    ground = static_cast<double>(row.ground);
-      const double variance = noise.pixel + kTogether * noise.ground * ground * ground;
+      const double variance = noise.pixel + noise.together * noise.ground * ground * ground;
       const double loss = levels_only ? 1 : 1 / (1 + r * r / (kCauchy * kCauchy * variance));
       products.add(row, static_cast<float>(loss / variance));
       pass.crossed += !row.flat;
@@ -110,11 +108,13 @@ PictureFit::Pass PictureFit::take(const cv::Mat& grey, const Noise& noise, bool 
   return pass;
 }
 
-// The loss takes some of the noise for outliers: a tenth.
+// The loss takes some of the noise for outliers: a fifth of what normal noise adds to the squares.
 PictureFit::Noise PictureFit::noise_of(const Pass& pass) {
   Noise noise;
-  noise.pixel = 1.1 * (pass.squares + 4) / (pass.weights + 4) + 1.0 / 12;
-  noise.ground = std::max(0.0, 1.1 * pass.ground_squares / std::max(pass.ground_weights, 1.0) - noise.pixel);
+  constexpr double kTaken = 1.25, kRounding = 1.0 / 12;
+  noise.pixel = std::max(kTaken * (pass.squares + 4) / (pass.weights + 4), kRounding);
+  noise.ground =
+      std::max(0.0, kTaken * pass.ground_squares / std::max(pass.ground_weights, 1.0) - noise.pixel);
   return noise;
 }
 
@@ -174,6 +174,7 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
     p.ground += x.segment<3>(PictureRow::kGround);
     if (round == 0) continue;
     noise = noise_of(pass);
+    noise.together = texture_together(0.5 * p.blur.trace());
     const PlaneStep step = x.head<8>();
     H = towards_camera(corrected(H, fitted.frame, step));
     const double mean = 0.5 * p.blur.trace() + x(8), most = 0.9 * std::max(mean, 0.1);

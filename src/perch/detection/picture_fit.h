@@ -35,6 +35,7 @@ class PictureFit {
  private:
   struct Noise {
     double pixel = 4, ground = 0;  // variance of a pixel; of the ground's texture, grey levels squared
+    double together = 4;           // as texture_together
   };
   struct Pass;
   Pass take(const cv::Mat& grey, const Noise& noise, bool levels_only);

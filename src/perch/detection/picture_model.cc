@@ -83,6 +83,14 @@ bool PictureModel::set(const Eigen::Matrix3d& H, const ImageFrame& frame,
       edge.tx = static_cast<float>(t.x());
       edge.ty = static_cast<float>(t.y());
       edge.start = static_cast<float>(-t.dot(pixel[k]));
+      // A lens bends it: from its chord to where its middle is seen.
+      const Eigen::Vector3d middle =
+          H * (0.5 * (edges_.edges[4 * i + k].from + edges_.edges[4 * i + k].to)).homogeneous();
+      const auto seen_middle = camera_.pixel_from_camera(middle);
+      if (!seen_middle) return false;
+      const Eigen::Vector2d from_end = *seen_middle - pixel[k];
+      const double part = std::clamp(t.dot(from_end), 0.1, 0.9);
+      edge.bend = static_cast<float>(n.dot(from_end) / (part * (1 - part)));
       edge.by_blur[0] = static_cast<float>(0.5 / sigma);
       edge.by_blur[1] = static_cast<float>(0.5 / sigma * (n.x() * n.x() - n.y() * n.y()));
       edge.by_blur[2] = static_cast<float>(n.x() * n.y() / sigma);
@@ -174,7 +182,8 @@ bool PictureModel::row_of(int column, int line, float grey, PictureRow& row) con
     bool outside = false, all = true;
     for (size_t k = 0; k < 4; ++k) {
       const Edge& e = shape.edges[k];
-      const float d = e.nx * x + e.ny * y + e.offset;
+      const float t = std::clamp(e.tx * x + e.ty * y + e.start, 0.0F, 1.0F);
+      const float d = e.nx * x + e.ny * y + e.offset - e.bend * t * (1 - t);
       if (d < -shape.room) return false;
       z[k] = d * e.per_sigma;
       if (z[k] < -kFar) outside = true;

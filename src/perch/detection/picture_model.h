@@ -30,16 +30,16 @@ struct PictureRow {
 };
 
 // The picture of a target of squares as its grey levels, from a homography, blur and three levels: each shape
-// is an area between four straight edges, spread by a Gaussian. The chance that a point of it is inside is
-// the product of those of both pairs of edges, and what adjacent edges that are not at right angles have in
-// common (the series of the bivariate normal distribution, to third order: where edges meet at 45 degrees,
-// half a percent of the step is left out).
+// is an area between four edges, straight but for the lens's distortion, spread by a Gaussian. The chance
+// that a point of it is inside is the product of those of both pairs of edges, and what adjacent edges that
+// are not at right angles have in common (the series of the bivariate normal distribution, to third order:
+// where edges meet at 45 degrees, half a percent of the step is left out).
 class PictureModel {
  public:
   PictureModel(const TargetEdges& edges, const CameraModel& camera) : edges_(edges), camera_(camera) {}
 
-  // False when not all of the target is before the camera and in its picture. A lens's distortion within one
-  // edge is not counted: this is for targets of less than a hundred px.
+  // False when not all of the target is before the camera and in its picture. Within one edge a lens's
+  // distortion is a parabola: this is for targets of less than a hundred px.
   bool set(const Eigen::Matrix3d& image_from_plane, const ImageFrame& frame,
            const PictureParameters& parameters);
 
@@ -57,6 +57,7 @@ class PictureModel {
     float nx, ny, offset;  // distance from the edge, inwards: n . p + offset, px
     float per_sigma;       // 1 / blur across it, px
     float tx, ty, start;   // the part of the edge beside p, 0 to 1: t . p + start
+    float bend;            // at the part t its place is bend t (1 - t) inwards of its chord, px
     float by_blur[3];      // of sigma by the blur's mean square, stretch along the axes and the diagonals
     std::array<float, 8> from, to;  // of the distance by a step, at the edge's ends
   };
