@@ -73,8 +73,7 @@ TEST_F(OverASerialLine, ThatLosesHalvesOfFramesPx4sEstimatorIsToldWithItsUncerta
       EXPECT_LT(std::abs(error(axis)), 5 * target.pos_std[static_cast<size_t>(axis)] + 0.005);
     }
   }
-  // Until VTE_EN is read it is taken for an older PX4; not any more from then on.
-  EXPECT_TRUE(landing_targets_since(targets.front().arrived_ns).empty());
+  EXPECT_TRUE(autopilot_.landing_targets().empty());
   const json mavlink = summary()["mavlink"];
   EXPECT_EQ(mavlink["profile"], "px4-vte");
   EXPECT_GT(mavlink["heard"]["bad_crc"].get<int>() + mavlink["heard"]["skipped_bytes"].get<int>(), 20);

@@ -218,8 +218,16 @@ TEST(Profile, IsThatOfTheHeartbeatUnlessToldOtherwise) {
   autopilot.autopilot = mav_autopilot::kArdupilot;
   EXPECT_EQ(profile_for(autopilot, parameters), LandingProfile::kArdupilot);
   autopilot.autopilot = mav_autopilot::kPx4;
-  EXPECT_EQ(profile_for(autopilot, parameters), LandingProfile::kPx4);
+  // LANDING_TARGET to one whose estimator runs would be wrong: nothing until that is known.
   parameters.read({"VTE_EN"});
+  int64_t now_ns = 0;
+  for (int asked = 0; asked < 8; now_ns += kSecond) {
+    EXPECT_EQ(profile_for(autopilot, parameters), LandingProfile::kNone);
+    asked += parameters.ask(now_ns).has_value();
+  }
+  EXPECT_EQ(profile_for(autopilot, parameters), LandingProfile::kPx4);  // an older one has no such parameter
+  parameters.read({"VTE_EN"});                                          // the link was cut and came back
+  EXPECT_EQ(profile_for(autopilot, parameters), LandingProfile::kPx4);
   ParamValue value;
   set_text(value.param_id, "VTE_EN");
   value.param_value = 1;

@@ -115,9 +115,11 @@ std::optional<LandingProfile> profile_named(std::string_view name) {
 LandingProfile profile_for(const Autopilot& autopilot, const ParameterReader& parameters) {
   if (autopilot.is_ardupilot()) return LandingProfile::kArdupilot;
   if (!autopilot.is_px4()) return LandingProfile::kNone;
+  // While it is not known whether the estimator runs, either message may be the wrong one.
   const auto estimator = parameters.values().find("VTE_EN");
-  return estimator != parameters.values().end() && estimator->second == 1 ? LandingProfile::kPx4Vte
-                                                                          : LandingProfile::kPx4;
+  if (estimator != parameters.values().end())
+    return estimator->second == 1 ? LandingProfile::kPx4Vte : LandingProfile::kPx4;
+  return parameters.absent().count("VTE_EN") ? LandingProfile::kPx4 : LandingProfile::kNone;
 }
 
 std::string_view name_of(LandingRefusal refusal) {

@@ -23,7 +23,8 @@ enum class LandingProfile { kNone, kArdupilot, kPx4, kPx4Vte };
 
 std::string_view name_of(LandingProfile profile);  // "ardupilot", ...
 std::optional<LandingProfile> profile_named(std::string_view name);
-// From the heartbeat, and on PX4 from VTE_EN; kNone for other autopilots, to which nothing is sent.
+// From the heartbeat, and on PX4 from VTE_EN, which older ones do not have; kNone, and nothing is sent, until
+// that is answered or asked for in vain, and for other autopilots.
 LandingProfile profile_for(const Autopilot& autopilot, const ParameterReader& parameters);
 
 // The pad as seen from the body at the moment of exposure.

@@ -64,8 +64,9 @@ double parameter_value(const ParamValue& message, uint8_t autopilot) {
 }
 
 void ParameterReader::read(const std::vector<std::string>& names) {
+  const std::set<std::string> in_vain = absent();
   wanted_.clear();
-  for (const std::string& name : names) wanted_[name];
+  for (const std::string& name : names) wanted_[name].in_vain = in_vain.count(name) > 0;
   std::erase_if(values_, [&](const auto& entry) { return !wanted_.count(entry.first); });
 }
 
@@ -102,7 +103,7 @@ bool ParameterReader::complete() const {
 std::set<std::string> ParameterReader::absent() const {
   std::set<std::string> names;
   for (const auto& [name, wanted] : wanted_) {
-    if (!wanted.known && wanted.tries >= kMaxTries) names.insert(name);
+    if (!wanted.known && (wanted.in_vain || wanted.tries >= kMaxTries)) names.insert(name);
   }
   return names;
 }

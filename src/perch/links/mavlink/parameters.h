@@ -20,8 +20,8 @@ double parameter_value(const ParamValue& message, uint8_t autopilot);
 // Asks for parameters by name, again until each has come or has to be taken for absent.
 class ParameterReader {
  public:
-  // Starts anew. Values of these names that are known stay so until they are read again: after a cut of the
-  // link they are better than none.
+  // Starts anew. What is known of these names, a value or that there is none, stays so until it is read
+  // again: after a cut of the link it is better than nothing.
   void read(const std::vector<std::string>& names);
 
   // The name to ask for now, if any.
@@ -39,6 +39,7 @@ class ParameterReader {
     int tries = 0;
     int64_t asked_ns = 0;
     bool known = false;
+    bool in_vain = false;  // before the last read()
   };
   std::map<std::string, Wanted> wanted_;
   std::map<std::string, double> values_;
