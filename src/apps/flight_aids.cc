@@ -12,7 +12,13 @@ FlightAids::FlightAids(const Flight& flight, const FrameChain& chain, const RunC
 }
 
 Estimator::Aid FlightAids::at(int64_t camera_time_ns) {
-  if (recorded_) return recorded_->at(camera_time_ns);
+  Estimator::Aid aid = recorded_ ? recorded_->at(camera_time_ns) : from_flight(camera_time_ns);
+  ++frames_;
+  headless_ += head_is_unknown(chain_, aid.angles);
+  return aid;
+}
+
+Estimator::Aid FlightAids::from_flight(int64_t camera_time_ns) {
   Estimator::Aid aid;
   if (const auto nav = flight_.nav.at(navigation_time_ns(chain_, camera_time_ns))) {
     aid.world_from_body = nav->world_from_body.rotation;
@@ -38,7 +44,14 @@ std::vector<AutopilotSample> FlightAids::said_until(int64_t camera_time_ns) {
 }
 
 std::vector<std::string> FlightAids::problems() const {
-  return recorded_ ? recorded_->problems() : std::vector<std::string>{};
+  auto problems = recorded_ ? recorded_->problems() : std::vector<std::string>{};
+  if (headless_ > 0) {
+    problems.push_back((flight_.folder / "mav0/gimbal0/data.csv").string() +
+                       ": no angles of the pan/tilt head at " + std::to_string(headless_) + " of " +
+                       std::to_string(frames_) +
+                       " frames: where the camera looked is not known, so these have no pad_from_body");
+  }
+  return problems;
 }
 
 }  // namespace perch

@@ -23,13 +23,15 @@ class FlightAids {
   std::vector<std::string> problems() const;
 
  private:
+  Estimator::Aid from_flight(int64_t camera_time_ns);
   std::vector<AutopilotSample> said_until(int64_t camera_time_ns);
 
   const Flight& flight_;
   const FrameChain chain_;
   const bool fuse_navigation_;
   std::optional<RecordedAids> recorded_;
-  size_t next_ = 0;  // of the navigation's samples
+  size_t next_ = 0;                // of the navigation's samples
+  int frames_ = 0, headless_ = 0;  // without the angles of their pan/tilt head
 };
 
 }  // namespace perch

@@ -122,6 +122,19 @@ TEST_F(PerchBatch, AFlightThatCannotBeEstimatedIsCountedAndTheRestDone) {
   EXPECT_THAT(read_file(folder_ / "out/report.html"), HasSubstr("no camera model: "));
 }
 
+TEST_F(PerchBatch, APanTiltHeadWithoutAnglesIsSaid) {
+  const Outcome result =
+      run("--config good/perch.yaml --output out --set "
+          "'frames.base_from_camera={pan_tilt: {base_from_zero: identity}}' good");
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(summary("good")["detection"]["counts"]["ok"], kFrames);
+  const std::string tum = read_file(folder_ / "out/good/pad_from_body.tum");
+  EXPECT_EQ(std::count(tum.begin(), tum.end(), '\n'), std::count(tum.begin(), tum.end(), '#'));
+  const std::vector<std::string> problems = summary("good")["problems"];
+  EXPECT_THAT(problems, testing::ElementsAre(HasSubstr("good/mav0/gimbal0/data.csv: no angles of the "
+                                                       "pan/tilt head at 12 of 12 frames")));
+}
+
 TEST_F(PerchBatch, ComparesWithAnEarlierRun) {
   ASSERT_EQ(run("--config good/perch.yaml --set detection.method=paper --output before good").code, 0);
   const Outcome result = run("--config good/perch.yaml --output out --compare before good");
