@@ -191,7 +191,9 @@ std::vector<std::string> LiveLink::take_events() {
 
 mavlink::VehicleSnapshot LiveLink::snapshot() const {
   const std::lock_guard lock(mutex_);
-  return snapshot_of(link_, output_.profile(link_), monotonic_ns());
+  auto snapshot = snapshot_of(link_, output_.profile(link_), monotonic_ns());
+  snapshot.gimbal = frames_.pan_tilt.has_value();
+  return snapshot;
 }
 
 bool LiveLink::settled() const {

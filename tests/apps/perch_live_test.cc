@@ -218,10 +218,14 @@ TEST_F(PerchLive, TheDoctorSaysWhatIsWrong) {
     for (const auto& name : mavlink::landing_parameters(autopilot.autopilot)) autopilot.parameters[name] = 1;
     autopilot.parameters["PLND_TYPE"] = 2;
   });
-  ChildProgram live = ChildProgram(folder_, PERCH_LIVE, {"--config", "run.yaml", "--check"});
+  // And a head that turns the camera, of which nobody tells.
+  ChildProgram live(folder_, PERCH_LIVE,
+                    {"--config", "run.yaml", "--check", "--set",
+                     "frames.base_from_camera={pan_tilt: {base_from_zero: identity}}"});
   EXPECT_EQ(live.wait(35), 1) << live.err();
   EXPECT_THAT(live.out(), HasSubstr("autopilot: ArduPilot 4.6.0, system 1\n"));
   EXPECT_THAT(live.out(), HasSubstr("error: PLND_TYPE is 2: LANDING_TARGET is listened to"));
+  EXPECT_THAT(live.out(), HasSubstr("error: gimbal rate is 0 Hz: the camera's direction is not known"));
   EXPECT_TRUE(autopilot_.landing_targets().empty());
 }
 
