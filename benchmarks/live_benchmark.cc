@@ -3,6 +3,9 @@
 // recording, on an idle machine and beside a program that keeps every core busy. See benchmarks/README.md.
 //
 //   perch_live_benchmark SECONDS [row]
+//   perch_live_benchmark SECONDS compare FILE   one turn each without and with recording, added to FILE's;
+//                                               the 99 % of all turns there against each other
+//   perch_live_benchmark SECONDS memory         a simulation that is recorded: what is resident each minute
 
 #include <signal.h>
 #include <sys/wait.h>
@@ -14,6 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/real_time_autopilot.h"
+#include "paired_latency.h"
 #include "perch/flight/sensor_file.h"
 #include "perch/simulation/simulation.h"
 #include "support/temp_folder.h"
@@ -81,7 +85,7 @@ std::vector<pid_t> keep_cores_busy() {
   return busy;
 }
 
-json run(const Row& row, const TempFolder& folder, int seconds) {
+json run(const Row& row, const TempFolder& folder, int seconds, std::vector<double>* latencies_ms = nullptr) {
   mavlink::RealTimeAutopilot autopilot;
   const std::string film = folder / "film.raw";
   std::vector<std::string> arguments = {PERCH_LIVE,
@@ -102,7 +106,60 @@ json run(const Row& row, const TempFolder& folder, int seconds) {
   for (const pid_t child : busy) kill(child, SIGKILL), waitpid(child, nullptr, 0);
   json summary = json::parse(read_file(folder / "summary.json"));
   summary["landing_targets"] = autopilot.landing_targets().size();
+  for (const auto& [arrived_ns, target] : autopilot.landing_targets()) {
+    if (latencies_ms)
+      latencies_ms->push_back(1e-6 * static_cast<double>(arrived_ns) -
+                              1e-3 * static_cast<double>(target.time_usec));
+  }
   return summary;
+}
+
+void compare(const TempFolder& folder, int seconds, const std::string& file) {
+  PairedLatencies paired(file);
+  const long turn = time(nullptr);
+  for (const char* record : {"", "png", "ffv1"}) {
+    std::vector<double> ms;
+    run({"", false, record, false}, folder, seconds, &ms);
+    paired.add(turn, *record ? std::string("recording ") + record : "not recording", ms);
+  }
+  paired.print("not recording");
+}
+
+double resident_mb(pid_t pid) {
+  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmRSS:")) return std::stod(line.substr(6)) / 1024;
+  }
+  return 0;
+}
+
+void watch_memory(const TempFolder& folder, int seconds) {
+  mavlink::RealTimeAutopilot autopilot;
+  folder.write("sim.yaml",
+               "target: " PERCH_SOURCE_DIR
+               "/configs/targets/sharp.yaml\n"
+               "camera: {width: 320, height: 240, lens: LENSMODEL_PINHOLE, intrinsics: [226, 226, 159.5, "
+               "119.5], rate_hz: 15}\n"
+               "flight: {start_height: 4, start_aside: 0.5, touchdown_height: 1.5, duration: 14, hover: " +
+                   std::to_string(seconds) + "}\n");
+  folder.write("memory.yaml", "target: " PERCH_SOURCE_DIR
+                              "/configs/targets/sharp.yaml\n"
+                              "camera: {source: 'sim:sim.yaml'}\noutputs: {mavlink: {}, record: flights}\n");
+  const pid_t child = start(folder.path().string(),
+                            {PERCH_LIVE, "--config", "memory.yaml", "--summary", "summary.json", "--duration",
+                             std::to_string(seconds), "--set", "nav=" + autopilot.url()},
+                            "");
+  for (int second = 1; second < seconds; ++second) {
+    sleep(1);
+    if (second % 60 != 0 && second + 1 != seconds) continue;
+    std::printf("after %d s %.1f MB\n", second, resident_mb(child));
+    std::fflush(stdout);
+  }
+  waitpid(child, nullptr, 0);
+  const json summary = json::parse(read_file(folder / "summary.json"));
+  std::printf("%lld frames, %zu messages, %lld pictures not recorded\n",
+              static_cast<long long>(summary["frames"]), autopilot.landing_targets().size(),
+              static_cast<long long>(summary["recording"]["frames_dropped"]));
 }
 
 void print(const Row& row, const json& summary) {
@@ -125,8 +182,12 @@ void print(const Row& row, const json& summary) {
   std::fflush(stdout);
 }
 
-int benchmark(int seconds, const std::string& only) {
+int benchmark(int seconds, const std::string& only, const std::string& file) {
   const TempFolder folder;
+  if (only == "memory") {
+    watch_memory(folder, seconds);
+    return 0;
+  }
   const SimulatedFlight flight(simulation());
   write_film(flight, folder / "film.raw", seconds);
   folder.write("camera.cameramodel", camera_model_text(flight.simulation().camera));
@@ -139,6 +200,10 @@ int benchmark(int seconds, const std::string& only) {
                                " ! rawvideoparse format=gray8 width=640 height=480 framerate=30/1'\n"
                                "frames: {body_from_base: identity}\n"
                                "outputs: {mavlink: {}}\n");
+  if (only == "compare") {
+    compare(folder, seconds, file);
+    return 0;
+  }
   std::puts(
       "| | waiting, ms | estimate, ms | exposure to sent, ms | CPU % of a core | capture | estimator | link "
       "| "
@@ -157,8 +222,9 @@ int benchmark(int seconds, const std::string& only) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr << "usage: perch_live_benchmark SECONDS [ROW]\n";
+    std::cerr << "usage: perch_live_benchmark SECONDS [ROW | compare FILE | memory]\n";
     return 2;
   }
-  return perch::benchmark(std::atoi(argv[1]), argc > 2 ? argv[2] : "");
+  return perch::benchmark(std::atoi(argv[1]), argc > 2 ? argv[2] : "",
+                          argc > 3 ? argv[3] : "live_latencies.txt");
 }
