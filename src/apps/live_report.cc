@@ -50,13 +50,10 @@ nlohmann::ordered_json latency_json(const LiveHistograms& histograms) {
 }
 
 nlohmann::ordered_json camera_json(const LiveCounters& counters) {
-  return {{"frames", counters.frames},
-          {"dropped", counters.dropped},
-          {"reopened", counters.reopened},
-          {"open_failed", counters.open_failed},
-          {"resized", counters.resized},
-          {"stalled", counters.stalled},
-          {"last_problem", counters.last_problem}};
+  return {{"frames", counters.frames},           {"dropped", counters.dropped},
+          {"settling", counters.settling},       {"reopened", counters.reopened},
+          {"open_failed", counters.open_failed}, {"resized", counters.resized},
+          {"stalled", counters.stalled},         {"last_problem", counters.last_problem}};
 }
 
 }  // namespace perch

@@ -206,6 +206,12 @@ class Supervisor {
       told_problem_ = problem;
       if (!problem.empty()) event("camera: " + problem);
     }
+    // The first alone: of a full disk each picture tells anew. How many it costs is said every 10 s.
+    if (recorder_ && !told_recording_) {
+      const std::string problem = recorder_->counters().last_problem;
+      told_recording_ = !problem.empty();
+      if (told_recording_) LOG(WARNING) << "recording: " << problem;
+    }
     if (supervision_.reload.exchange(false))
       event("SIGHUP: nothing is reloaded; a changed configuration needs a restart");
   }
@@ -245,6 +251,7 @@ class Supervisor {
   int64_t last_log_ns_ = begin_ns_;
   mavlink::PadState told_state_ = mavlink::PadState::kSearch;
   std::string told_problem_;
+  bool told_recording_ = false;
   uint64_t fed_progress_ = 0;
   int64_t fed_ns_ = 0;
 };

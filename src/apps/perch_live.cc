@@ -39,6 +39,7 @@ void handle_signals() {
   std::signal(SIGTERM, [](int) { stop_requested = true; });
   std::signal(SIGHUP, [](int) { reload_requested = true; });
   std::signal(SIGPIPE, SIG_IGN);  // a log nobody reads any more
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may grow no more: the recorder counts that
 }
 
 void check_flags(const CommandLine& line) {

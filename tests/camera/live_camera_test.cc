@@ -24,6 +24,7 @@ struct World {
   bool frozen = false;       // no pictures come
   bool breaks = false;       // the next grab() throws
   int64_t stamp_off_ns = 0;  // added to the stamps
+  bool settling = false;
   int width = 4;
   std::vector<int64_t> opened_ms;  // when it was tried, since the start
   int open = 0;                    // open()s less close()s
@@ -54,7 +55,7 @@ class ScriptedCamera : public CameraDevice {
     if (world_.frozen || due - now > timeout_ns) return {};
     frame.timestamp_ns = due - 3 * kMs + world_.stamp_off_ns;
     frame.grey = cv::Mat::zeros(4, world_.width, CV_8UC1);
-    return {true, 0, ""};
+    return {true, 0, "", world_.settling};
   }
   std::string name() const override { return "toy"; }
 
@@ -90,6 +91,17 @@ TEST(LiveCamera, GivesPicturesAsTheyComeWithTheLatencyTakenOff) {
   EXPECT_FALSE(source->recorded());
   EXPECT_EQ(source->counters().frames, 102);
   EXPECT_EQ(source->counters().last_problem, "");
+}
+
+TEST(LiveCamera, KeepsPicturesBackWhileTheirTimesSettleAndStaysOpen) {
+  World world;
+  world.settling = true;
+  const auto source = camera(world);
+  EXPECT_EQ(watch(*source, world, 8000), 0);
+  EXPECT_GE(source->counters().settling, 790);
+  EXPECT_EQ(world.opened_ms.size(), 1U);
+  world.settling = false;
+  EXPECT_GE(watch(*source, world, 1000), 95);
 }
 
 TEST(LiveCamera, WaitsForACameraThatIsNotThereLongerAndLonger) {

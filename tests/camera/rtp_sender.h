@@ -1,17 +1,14 @@
 #pragma once
 
-#include <arpa/inet.h>
 #include <gst/app/gstappsrc.h>
 #include <gst/gst.h>
-#include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <cstring>
 #include <opencv2/core.hpp>
 #include <string>
 
 #include "perch/camera/live_source.h"
+#include "support/udp_port.h"
 
 namespace perch {
 
@@ -34,19 +31,6 @@ inline uint64_t number_in(const cv::Mat& picture) {
     if (cv::mean(picture(middle))[0] > 125) number |= uint64_t{1} << bit;
   }
   return number;
-}
-
-// A UDP port of this machine that nobody uses.
-inline int free_udp_port() {
-  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&address), size), 0);
-  getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
-  close(fd);
-  return ntohs(address.sin_port);
 }
 
 // A camera on the network: sends pictures on which the time of their making is drawn.

@@ -5,6 +5,7 @@
 #include <gst/video/video.h>
 
 #include <algorithm>
+#include <limits>
 #include <mutex>
 #include <stdexcept>
 
@@ -34,6 +35,10 @@ using GError_ = std::unique_ptr<GError, Release<g_error_free>>;
 constexpr char kSink[] = "perch_sink";
 // How often a wait for a picture looks whether the pipeline broke meanwhile.
 constexpr int64_t kLookNs = 50'000'000;
+// An rtpjitterbuffer matches the sender's clock to ours by the quickest packet of two seconds. Until it has
+// seen these, stamps are late by what the first packet was, less and less: 3 ms where that was encoded
+// slowly, as long as a radio link likes to take.
+constexpr int64_t kRtpSettlesNs = 2'100'000'000;
 
 void start_gstreamer() {
   static std::once_flag once;
@@ -112,7 +117,12 @@ class GstDevice : public CameraDevice {
     convert(sample.get(), frame);
     stamp(sample.get(), frame, grab);
     if (first_) set_synchronised();
+    if (first_ && matches_clocks()) {
+      settled_ns_ = frame.timestamp_ns + kRtpSettlesNs;
+      grab.problem = name() + ": RTP: pictures of the first 2.1 s are left out, until their times are known";
+    }
     first_ = false;
+    grab.settling = frame.timestamp_ns < settled_ns_;
     return grab;
   }
 
@@ -160,6 +170,7 @@ class GstDevice : public CameraDevice {
 
   void play() {
     first_ = true;
+    settled_ns_ = std::numeric_limits<int64_t>::min();
     const auto paused = gst_element_set_state(pipeline_.get(), GST_STATE_PAUSED);
     // A live source gives nothing in PAUSED. What is not known to be live is played by its time stamps, until
     // its first picture tells (set_synchronised): a file would be over in a moment.
@@ -180,6 +191,18 @@ class GstDevice : public CameraDevice {
     if (gst_pad_peer_query(pad.get(), query)) gst_query_parse_latency(query, &live, nullptr, nullptr);
     gst_query_unref(query);
     if (live) g_object_set(sink_.get(), "sync", FALSE, nullptr);
+  }
+
+  // Asked with the first picture: what the pipeline makes as it goes, as rtspsrc does, is there by then.
+  bool matches_clocks() const {
+    GstIterator* found =
+        gst_bin_iterate_all_by_element_factory_name(GST_BIN(pipeline_.get()), "rtpjitterbuffer");
+    GValue element = G_VALUE_INIT;
+    GstIteratorResult result = GST_ITERATOR_RESYNC;
+    while ((result = gst_iterator_next(found, &element)) == GST_ITERATOR_RESYNC) gst_iterator_resync(found);
+    if (result == GST_ITERATOR_OK) g_value_unset(&element);
+    gst_iterator_free(found);
+    return result == GST_ITERATOR_OK;
   }
 
   // Why no more pictures will come; nothing: they will.
@@ -246,6 +269,7 @@ class GstDevice : public CameraDevice {
   uint64_t taken_ = 0;           // the number that the next picture has if none is lost
   int64_t clock_offset_ns_ = 0;  // CLOCK_MONOTONIC less the pipeline's clock
   bool first_ = true;            // no picture yet since it was opened
+  int64_t settled_ns_ = 0;       // stamps from then on are to be relied upon
   cv::Mat grey_;
   Element pipeline_, sink_;
   Bus bus_;

@@ -85,6 +85,10 @@ class LiveCamera : public LiveSource {
                                std::to_string(patience_ns_ / 1'000'000) + " ms");
     }
     note_period(picture.arrived_ns);
+    if (grab.settling) {
+      tally_.add(&LiveCounters::settling);
+      return std::nullopt;
+    }
     picture.frame.timestamp_ns -= ns(options_.latency);
     if (!believable(picture)) return std::nullopt;
     retry_ns_ = kFirstRetryNs;

@@ -11,8 +11,9 @@ namespace perch {
 // What a device has to say when it is asked for a picture.
 struct Grab {
   bool picture = false;
-  int64_t lost = 0;     // pictures that there were since the last one and that nobody will see
-  std::string problem;  // worth telling, and no reason to open the device anew
+  int64_t lost = 0;       // pictures that there were since the last one and that nobody will see
+  std::string problem;    // worth telling, and no reason to open the device anew
+  bool settling = false;  // the stamp is not to be relied upon yet
 };
 
 // A camera as LiveCamera drives it: opened, asked for pictures until something is wrong, closed, opened
@@ -35,8 +36,9 @@ class CameraDevice {
 //   closed ───────────────▶ open   open ──────────────────────────────────────────▶ closed
 //   closed: tried again after 0.1 s, twice as long after each failure up to 5 s; a picture sets that back.
 //
-// Takes options.latency off the stamps, and drops pictures whose stamp cannot be true: not after the last
-// one's, in the future, or older than any camera keeps a picture.
+// Takes options.latency off the stamps, keeps back pictures while the device's stamps settle, and drops
+// pictures whose stamp cannot be true: not after the last one's, in the future, or older than any camera
+// keeps a picture.
 std::unique_ptr<LiveSource> make_live_camera(std::unique_ptr<CameraDevice> device, const LiveOptions& options,
                                              LiveClock& clock = monotonic_clock());
 

@@ -42,6 +42,7 @@ struct LiveOptions {
 struct LiveCounters {
   int64_t frames = 0;        // given out by next(), unreadable ones included
   int64_t dropped = 0;       // lost on the way: gaps in the camera's own numbers, broken ones, too late ones
+  int64_t settling = 0;      // left out while the sender's clock was being matched to ours
   int64_t reopened = 0;      // opened again with success
   int64_t open_failed = 0;   // attempts to open without success
   int64_t resized = 0;       // pictures of another size than the one before
