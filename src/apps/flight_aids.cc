@@ -1,5 +1,7 @@
 #include "flight_aids.h"
 
+#include <cmath>
+
 #include "perch/flight/head_angles.h"
 
 namespace perch {
@@ -23,7 +25,8 @@ Estimator::Aid FlightAids::from_flight(int64_t camera_time_ns) {
   if (const auto nav = flight_.nav.at(navigation_time_ns(chain_, camera_time_ns))) {
     aid.world_from_body = nav->world_from_body.rotation;
   }
-  aid.angles = head_angles_at(flight_.gimbal, camera_time_ns);
+  const double latency = chain_.pan_tilt ? chain_.pan_tilt->latency : 0;
+  aid.angles = head_angles_at(flight_.gimbal, camera_time_ns + std::llround(1e9 * latency));
   if (fuse_navigation_) aid.autopilot = said_until(camera_time_ns);
   return aid;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <sstream>
 
 #include "perch/config/strict_yaml.h"
@@ -13,7 +14,8 @@ namespace fs = std::filesystem;
 struct Section::Document {
   fs::path file;
   YAML::Node resolved;
-  std::set<std::string> overridden;  // full keys that --set gave
+  std::set<std::string> overridden;          // full keys that --set gave
+  std::map<std::string, fs::path> included;  // files that stand for keys of the root
 
   // The key of the --set that gave `path` or what it lies in; empty when the file did.
   std::string override_of(std::string path) const {
@@ -34,15 +36,39 @@ Section::Section(std::shared_ptr<Document> document, const YAML::Node& node, con
       line_(line),
       known_(std::make_shared<std::set<std::string>>()) {}
 
-Section Section::load(const fs::path& file, const std::vector<std::string>& overrides) {
+namespace {
+
+std::string text_of(const fs::path& file, const std::string& who) {
   std::ifstream stream(file, std::ios::binary);
   std::error_code ignored;
   if (!stream || fs::is_directory(file, ignored)) {
-    throw ConfigError(file.string() + ": expected a YAML file, found none that can be read");
+    throw ConfigError(who + file.string() + ": expected a YAML file, found none that can be read");
   }
   std::ostringstream text;
   text << stream.rdbuf();
-  return parse(text.str(), file, overrides);
+  return text.str();
+}
+
+// `frames: !include mount.yaml` puts what another file says in the place of a key of the root, so that what a
+// calibration wrote need not be copied. Relative to this file; what is included includes nothing itself.
+std::map<std::string, fs::path> include_files(YAML::Node& root, const fs::path& name) {
+  std::map<std::string, fs::path> included;
+  for (auto entry : root) {
+    if (entry.second.Tag() != "!include") continue;
+    const std::string place = name.string() + ":" + std::to_string(entry.first.Mark().line + 1) + ": " +
+                              entry.first.Scalar() + ": ";
+    if (!entry.second.IsScalar()) throw ConfigError(place + "!include: expected the name of a file");
+    const fs::path file = (name.parent_path() / entry.second.Scalar()).lexically_normal();
+    included[entry.first.Scalar()] = file;
+    root[entry.first.Scalar()] = strict_yaml(text_of(file, place), file);
+  }
+  return included;
+}
+
+}  // namespace
+
+Section Section::load(const fs::path& file, const std::vector<std::string>& overrides) {
+  return parse(text_of(file, ""), file, overrides);
 }
 
 Section Section::parse(const std::string& text, const fs::path& name,
@@ -55,6 +81,7 @@ Section Section::parse(const std::string& text, const fs::path& name,
     throw ConfigError(name.string() + ":" + std::to_string(root.Mark().line + 1) +
                       ": expected a mapping, found " + found(root));
   }
+  document->included = include_files(root, name);
   for (const auto& entry : overrides) document->overridden.insert(override_yaml(root, entry));
   document->resolved = YAML::Node(YAML::NodeType::Map);
   return Section(document, root, document->resolved, "", 0);
@@ -76,7 +103,10 @@ int Section::line_of(const YAML::Node& node, const std::string& path) const {
 
 std::string Section::place(const YAML::Node& node, const std::string& path) const {
   if (const auto key = document_->override_of(path); !key.empty()) return "--set " + key;
-  return document_->file.string() + ":" + std::to_string(line_of(node, path) + 1);
+  const auto included = document_->included.find(path.substr(0, path.find_first_of(".[")));
+  const bool is_included = included != document_->included.end() && included->first != path;
+  return (is_included ? included->second : document_->file).string() + ":" +
+         std::to_string(line_of(node, path) + 1);
 }
 
 void Section::fail_at(const YAML::Node& node, const std::string& path, const std::string& expected) const {

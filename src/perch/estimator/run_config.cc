@@ -58,6 +58,7 @@ RunConfig read_run_config(Section root) {
   root.read("nav", nav);
   root.section("outputs");
   root.section("ptz");
+  root.section("calibrate_mount");  // perch-calibrate-mount's
   root.done();
   return config;
 }

@@ -1,21 +1,52 @@
 #include "perch/frames/frame_chain.h"
 
+#include <Eigen/QR>
 #include <cmath>
 
 #include "perch/geometry/euler.h"
+#include "perch/geometry/so3.h"
 
 namespace perch {
+
+namespace {
+
+HeadAxis read_axis(Section section, HeadAxis axis) {
+  std::vector<double> direction(axis.direction.data(), axis.direction.data() + 3), point(3, 0.0);
+  section.read("direction", direction, 3, Range{-1e3, 1e3});
+  axis.direction = Eigen::Vector3d(direction.data());
+  if (!(axis.direction.norm() > 1e-6)) section.fail("direction", "a vector of some length");
+  axis.direction.normalize();
+  section.read("point", point, 3, Range{-100, 100});
+  axis.point = Eigen::Vector3d(point.data());
+  section.read("scale", axis.scale, Range{0.1, 10});
+  double zero_deg = 0;
+  section.read("zero_deg", zero_deg, Range{-360, 360});
+  axis.zero = zero_deg * kRadFromDeg;
+  section.done();
+  return axis;
+}
+
+PanTilt read_pan_tilt(Section head) {
+  PanTilt pan_tilt;
+  head.read("base_from_zero", pan_tilt.base_from_zero);
+  pan_tilt.pan = read_axis(head.section("pan"), pan_tilt.pan);
+  pan_tilt.tilt = read_axis(head.section("tilt"), pan_tilt.tilt);
+  head.read_choice(
+      "order", pan_tilt.order,
+      {{"pan_carries_tilt", HeadOrder::kPanCarriesTilt}, {"tilt_carries_pan", HeadOrder::kTiltCarriesPan}});
+  head.read("latency", pan_tilt.latency, Range{-10, 10});
+  head.done();
+  return pan_tilt;
+}
+
+}  // namespace
 
 FrameChain read_frame_chain(Section frames) {
   FrameChain chain;
   if (frames.has("base_from_camera") && frames.is_mapping_with("base_from_camera", "pan_tilt")) {
     Section base = frames.section("base_from_camera");
-    Section head = base.section("pan_tilt");
-    PanTilt pan_tilt;
-    head.read("base_from_zero", pan_tilt.base_from_zero);
-    head.done();
+    chain.pan_tilt = read_pan_tilt(base.section("pan_tilt"));
     base.done();
-    chain.pan_tilt = pan_tilt;
   } else {
     frames.read("base_from_camera", chain.base_from_camera);
   }
@@ -28,13 +59,20 @@ FrameChain read_frame_chain(Section frames) {
   return chain;
 }
 
+Rigid3 head_turn(const HeadAxis& axis, double reading) {
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(axis.scale * reading + axis.zero, axis.direction));
+  return {turn, axis.point - turn * axis.point};
+}
+
 Rigid3 base_from_camera(const FrameChain& chain, const std::optional<HeadAngles>& angles) {
   if (!chain.pan_tilt) return chain.base_from_camera;
   const HeadAngles a = angles.value_or(HeadAngles{});
-  const Eigen::Quaterniond pan(Eigen::AngleAxisd(a.pan, Eigen::Vector3d::UnitY()));
-  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(a.tilt, Eigen::Vector3d::UnitX()));
+  const Rigid3 pan = head_turn(chain.pan_tilt->pan, a.pan);
+  const Rigid3 tilt = head_turn(chain.pan_tilt->tilt, a.tilt);
+  const bool pan_first = chain.pan_tilt->order == HeadOrder::kPanCarriesTilt;
   const Eigen::Quaterniond roll(Eigen::AngleAxisd(a.roll, Eigen::Vector3d::UnitZ()));
-  return chain.pan_tilt->base_from_zero * Rigid3{pan * tilt * roll, Eigen::Vector3d::Zero()};
+  return chain.pan_tilt->base_from_zero * (pan_first ? pan * tilt : tilt * pan) *
+         Rigid3{roll, Eigen::Vector3d::Zero()};
 }
 
 std::optional<HeadAngles> head_angles_of(const FrameChain& chain,
@@ -44,16 +82,28 @@ std::optional<HeadAngles> head_angles_of(const FrameChain& chain,
   constexpr double kMostLeft = 2 * kRadFromDeg;
   const Eigen::Quaterniond body_from_base =
       chain.body_from_base ? chain.body_from_base->rotation : Eigen::Quaterniond::Identity();
-  const Eigen::Quaterniond turned =
-      (body_from_base * chain.pan_tilt->base_from_zero.rotation).conjugate() * body_from_camera;
-  const Eigen::Matrix3d R = turned.toRotationMatrix();  // Ry(pan) Rx(tilt)
+  const Eigen::Quaterniond base_from_camera_seen = body_from_base.conjugate() * body_from_camera;
+  // The angles of ideal axes to begin with: Ry(pan) Rx(tilt).
+  const Eigen::Matrix3d R =
+      (chain.pan_tilt->base_from_zero.rotation.conjugate() * base_from_camera_seen).toRotationMatrix();
   HeadAngles angles;
   angles.pan = std::atan2(-R(2, 0), R(0, 0));
-  const Eigen::Quaterniond pan(Eigen::AngleAxisd(angles.pan, Eigen::Vector3d::UnitY()));
-  const Eigen::Matrix3d rest = (pan.conjugate() * turned).toRotationMatrix();
-  angles.tilt = std::atan2(rest(2, 1), rest(1, 1));
-  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(angles.tilt, Eigen::Vector3d::UnitX()));
-  if (!((pan * tilt).angularDistance(turned) < kMostLeft)) return std::nullopt;
+  angles.tilt = std::atan2(-R(1, 2), R(1, 1));
+  // Gauss-Newton on the rotation that is left, for axes as they were calibrated.
+  const auto left_at = [&](const HeadAngles& a) {
+    return so3_log(base_from_camera(chain, a).rotation.conjugate() * base_from_camera_seen);
+  };
+  constexpr double kStep = 1e-5;
+  for (int pass = 0; pass < 5; ++pass) {
+    const Eigen::Vector3d left = left_at(angles);
+    HeadAngles panned = angles, tilted = angles;
+    panned.pan += kStep, tilted.tilt += kStep;
+    Eigen::Matrix<double, 3, 2> slope;
+    slope << (left_at(panned) - left) / kStep, (left_at(tilted) - left) / kStep;
+    const Eigen::Vector2d step = slope.colPivHouseholderQr().solve(-left);
+    angles.pan += step.x(), angles.tilt += step.y();
+  }
+  if (!(left_at(angles).norm() < kMostLeft)) return std::nullopt;
   return angles;
 }
 

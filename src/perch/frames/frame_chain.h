@@ -9,20 +9,41 @@
 
 namespace perch {
 
-// A pan/tilt head between the base and the camera. At zero angles the camera sits at base_from_zero; the tilt
-// axis moves with the pan. Positive pan turns the camera right (the target moves left in the picture),
-// positive tilt turns it up (the target moves down): the paper's section 3.2, with the base's axes those of a
-// camera (x right, y down, z forward) and the optical centre on both axes.
-struct PanTilt {
-  Rigid3 base_from_zero;
-};
-
 struct HeadAngles {
   double pan = 0, tilt = 0;              // rad
   double pan_sigma = 0, tilt_sigma = 0;  // how well they are known at that moment, rad
   double roll =
       0;  // then, about the optical axis, clockwise as the camera sees it: of stabilised gimbals alone, rad
 };
+
+// One axis of a head, in the axes of the camera at zero angles. The camera turns by scale * reading + zero
+// about the line through `point` along `direction`.
+struct HeadAxis {
+  Eigen::Vector3d direction;                        // unit
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // any of the axis, m
+  double scale = 1;                                 // rad of turn a rad of reading
+  double zero = 0;                                  // turn at reading 0, rad
+};
+
+enum class HeadOrder { kPanCarriesTilt, kTiltCarriesPan };
+
+// A pan/tilt head between the base and the camera: the product of exponentials
+//
+//   base_from_camera = base_from_zero * Turn(pan) * Turn(tilt)      (or tilt first, by `order`)
+//
+// Positive pan turns the camera right (the target moves left in the picture), positive tilt turns it up (the
+// target moves down). By default the paper's section 3.2: the axes of the base are those of a camera (x
+// right, y down, z forward) and the optical centre lies on both axes.
+struct PanTilt {
+  Rigid3 base_from_zero;
+  HeadAxis pan{Eigen::Vector3d::UnitY()};
+  HeadAxis tilt{Eigen::Vector3d::UnitX()};
+  HeadOrder order = HeadOrder::kPanCarriesTilt;
+  double latency = 0;  // a reading's time stamp minus the moment the head was there, s
+};
+
+// What a turn about an axis by its reading does to the camera.
+Rigid3 head_turn(const HeadAxis& axis, double reading);
 
 // The frame chain of the paper's figure 3.2; the letters are those of its table 3.1.
 //

@@ -88,7 +88,7 @@ HeadAngles HeadControl::expected(int64_t time_ns,
   return centring(world ? world_from_body->conjugate() * target : target).value_or(HeadAngles{});
 }
 
-double HeadControl::speed(const HeadAxis& axis, double goal, double goal_rate, double angle) const {
+double HeadControl::speed(const AxisLimits& axis, double goal, double goal_rate, double angle) const {
   const double error = goal - angle;
   if (std::abs(error) < options_.dead_band && std::abs(goal_rate) < axis.speed_step / 2) return 0;
   return std::clamp(goal_rate + options_.gain * error, -axis.max_speed, axis.max_speed);

@@ -57,7 +57,7 @@ class HeadControl {
   void remember(const VehicleState& state, int64_t now_ns,
                 const std::optional<Eigen::Quaterniond>& world_from_body);
   HeadAngles expected(int64_t time_ns, const std::optional<Eigen::Quaterniond>& world_from_body) const;
-  double speed(const HeadAxis& axis, double goal, double goal_rate, double angle) const;
+  double speed(const AxisLimits& axis, double goal, double goal_rate, double angle) const;
 
   FrameChain chain_;
   Rigid3 zero_from_body_;

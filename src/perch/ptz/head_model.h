@@ -3,7 +3,7 @@
 namespace perch {
 
 // One axis of a head, rad and rad/s.
-struct HeadAxis {
+struct AxisLimits {
   double min = 0, max = 0;
   double max_speed = 0;
   double speed_step = 0;  // between one speed and the next
@@ -12,7 +12,7 @@ struct HeadAxis {
 
 // What a head can do. Signs as in PanTilt: pan to the right, tilt up.
 struct HeadModel {
-  HeadAxis pan, tilt;
+  AxisLimits pan, tilt;
 };
 
 // Sony's EVI-D30 and D31: pan FC90h to 0370h is -100 to 100 degrees, tilt FED4h to 012Ch -25 to 25 (EVI-D70

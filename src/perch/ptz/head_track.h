@@ -54,7 +54,7 @@ class HeadTrack {
   struct Axis {
     double Report::*angle;
     double HeadGoal::*goal;
-    const HeadAxis* limits;
+    const AxisLimits* limits;
   };
   struct Guess {
     double angle = 0, sigma = 0;

@@ -28,7 +28,7 @@ double SearchPattern::spiral_duration() const {
 
 HeadAngles SearchPattern::at(double since_lost, const HeadAngles& expected) const {
   const double t = std::max(0.0, since_lost);
-  const auto within = [](double angle, const HeadAxis& axis) {
+  const auto within = [](double angle, const AxisLimits& axis) {
     return std::clamp(angle, axis.min, axis.max);
   };
   HeadAngles angles;

@@ -33,16 +33,16 @@ constexpr double kZoomAgrees = 0.01;
 double seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 int64_t nanoseconds(double s) { return std::llround(s * 1e9); }
 
-int16_t counts_of(double angle, const HeadAxis& axis) {
+int16_t counts_of(double angle, const AxisLimits& axis) {
   return static_cast<int16_t>(std::lround(std::clamp(angle, axis.min, axis.max) / axis.count));
 }
 
-int16_t relative_counts(double angle, const HeadAxis& axis) {
+int16_t relative_counts(double angle, const AxisLimits& axis) {
   const double most = axis.max - axis.min;
   return static_cast<int16_t>(std::lround(std::clamp(angle, -most, most) / axis.count));
 }
 
-int steps(double speed, const HeadAxis& axis) {
+int steps(double speed, const AxisLimits& axis) {
   return static_cast<int>(std::lround(std::clamp(speed, -axis.max_speed, axis.max_speed) / axis.speed_step));
 }
 
