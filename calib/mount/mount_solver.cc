@@ -66,7 +66,7 @@ void build(const MountProblem& problem, const MountSolution& solution, ceres::Lo
 
 void solve(ceres::Problem& problem) {
   ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.linear_solver_type = ceres::SPARSE_SCHUR;
   options.max_num_iterations = 30;
   options.num_threads = 2;
   options.function_tolerance = 1e-9;

@@ -2,20 +2,24 @@
 
 #include <ceres/problem.h>
 
-#include <deque>
-#include <map>
 #include <span>
 
 #include "calib/mount/sight_cost.h"
 
 namespace perch {
 
-// The corrections of a flight's trajectory as states of the least squares: truth = perturb(navigation, c).
+// The corrections of a flight's trajectory as states of the least squares, one at each picture:
 //
-//   smooth trajectory   c(t) = u(t) - b(t), u linear between states a tenth of a second apart, each measured
-//                       by the navigation's samples about the curve
-//   joined samples      c = u - b with one u a picture, of the samples' own noise
-//   b                   the drift, Ornstein-Uhlenbeck through the same states; absent where there is none
+//   truth = perturb(navigation, c),   c = u - b
+//
+// u is what navigation's white noise leaves of the curve, independent from picture to picture; b its drift,
+// an Ornstein-Uhlenbeck process through the pictures, absent where there is none.
+//
+// The curve's errors at neighbouring pictures are the same samples' noise. u of many pictures must not know
+// more together than these samples do, so its variance is that of a sample times the number of pictures a
+// sample, or the curve's own where that is more. Sharing linear states between pictures, 0.1 s apart, was
+// tried: the curve's error is not linear over that time, and half a pixel of misfit moved the lever arm by
+// metres.
 class TrajectoryStates {
  public:
   // `camera_ns`: of the pictures that are used, ascending.
@@ -26,26 +30,14 @@ class TrajectoryStates {
   std::vector<CorrectionPart> parts(size_t picture);
 
  private:
-  struct Node {
-    double time = 0;  // s after the first picture
-    Vector6d measured = Vector6d::Zero(), drift = Vector6d::Zero();
+  struct State {
+    double time = 0;        // s after the first picture
+    double noise_part = 1;  // of u's variance in that of a sample
+    Vector6d u = Vector6d::Zero(), b = Vector6d::Zero();
   };
-  struct Place {
-    Node* a = nullptr;
-    Node* b = nullptr;  // null: a alone
-    double s = 0;       // of the way from a to b
-    double noise_part = 1;
-  };
-  void add_samples(ceres::Problem& problem, const Place& place, int64_t cell) const;
-
-  const Trajectory& trajectory_;
   NavigationNoise noise_;
   bool drifts_;
-  int64_t start_ns_ = 0;           // of cell 0, navigation clock
-  double spacing_ = 0.1;           // s
-  std::map<int64_t, Node> nodes_;  // addresses stay
-  std::vector<Place> places_;
-  std::vector<int64_t> cells_;
+  std::vector<State> states_;
 };
 
 }  // namespace perch

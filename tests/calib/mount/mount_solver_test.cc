@@ -78,7 +78,7 @@ TEST(MountSolver, AThirdOfWrongPosesDoesNoHarm) {
 // Slow errors of GPS and heading: taken for white noise they would make the deviations four times too small.
 TEST(MountSolver, KnowsDriftForWhatItIs) {
   double nees = 0;
-  constexpr int kSeeds = 3;
+  constexpr int kSeeds = 2;
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
     TestRng rng(seed);
     MountWorld world;
@@ -89,8 +89,8 @@ TEST(MountSolver, KnowsDriftForWhatItIs) {
     const Eigen::VectorXd e = errors_of(s, world).head<6>();
     nees += e.dot(s.covariance.topLeftCorner<6, 6>().ldlt().solve(e)) / 6 / kSeeds;
   }
-  // Of 18 degrees of freedom: 2.3 is exceeded once in 1000 times.
-  EXPECT_LT(nees, 2.3);
+  // Of 12 degrees of freedom: 2.7 is exceeded once in 1000 times.
+  EXPECT_LT(nees, 2.7);
 }
 
 TEST(MountSolver, SaysWhatIsWrongWithTheNavigation) {
