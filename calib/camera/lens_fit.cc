@@ -144,10 +144,8 @@ LensSeed seed_from_focal_length(const BoardViews& views, double guess_px) {
 
 LensFit fit_lens(const BoardViews& views, const std::string& lens, const LensSeed& seed,
                  const FitOptions& options) {
-  LensFit start;
-  start.lens = lens;
-  start.camera_from_board = seed.camera_from_board;
-  MrcalProblem problem = problem_at(views, start);
+  MrcalProblem problem(views, lens);
+  problem.set_poses(seed.camera_from_board);
   append_distortions(seed, options.seed, problem);
   // Always with the regularisation at first: from far off a free lens goes anywhere.
   FitOptions flat = options;

@@ -209,12 +209,16 @@ MrcalProblem problem_at(const BoardViews& views, const LensFit& fit) {
   MrcalProblem problem(views, fit.lens);
   problem.intrinsics = fit.intrinsics;
   problem.warp = {{fit.warp.x(), fit.warp.y()}};
-  for (size_t i = 0; i < fit.camera_from_board.size(); ++i) {
-    const auto& v = fit.camera_from_board[i];
-    problem.poses[i] = {{{v(0), v(1), v(2)}}, {{v(3), v(4), v(5)}}};
-  }
+  problem.set_poses(fit.camera_from_board);
   problem.mark_outliers(fit);
   return problem;
+}
+
+void MrcalProblem::set_poses(const std::vector<LensFit::PoseVector>& camera_from_board) {
+  for (size_t i = 0; i < camera_from_board.size(); ++i) {
+    const auto& v = camera_from_board[i];
+    poses[i] = {{{v(0), v(1), v(2)}}, {{v(3), v(4), v(5)}}};
+  }
 }
 
 void MrcalProblem::mark_outliers(const LensFit& fit) {

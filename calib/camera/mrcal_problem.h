@@ -53,6 +53,7 @@ class MrcalProblem {
   std::vector<mrcal_pose_t> poses;
   mrcal_calobject_warp_t warp{};
 
+  void set_poses(const std::vector<LensFit::PoseVector>& camera_from_board);
   void mark_outliers(const LensFit& fit);
 
  private:
