@@ -20,9 +20,9 @@ std::string short_name(const std::string& lens) {
   return lens.starts_with(kPrefix) ? lens.substr(kPrefix.size()) : lens;
 }
 
-std::string rounded(double value) {
+std::string rounded(double value, const char* format = "%.3g") {
   char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
+  std::snprintf(text, sizeof text, format, value);
   return text;
 }
 
@@ -138,42 +138,32 @@ Candidate solve(const BoardViews& views, const std::string& lens, const LensSeed
   return candidate;
 }
 
-// How the held-out squares of two candidates differ: mean over the views, and the mean's standard error.
-struct Comparison {
-  double mean = 0, error = 0;
-};
-Comparison compare(const std::vector<double>& a, const std::vector<double>& b) {
-  const auto n = static_cast<double>(a.size());
+// Whether the held-out squares of `a` are above those of `b` by no more than the mean difference's standard
+// error.
+bool is_as_good(const CrossValidation& a, const CrossValidation& b) {
+  const auto n = static_cast<double>(a.by_view.size());
   double sum = 0, squares = 0;
-  for (size_t i = 0; i < a.size(); ++i) sum += a[i] - b[i];
-  for (size_t i = 0; i < a.size(); ++i) squares += std::pow(a[i] - b[i] - sum / n, 2);
-  return {sum / n, std::sqrt(squares / (n - 1) / n)};
+  for (size_t i = 0; i < a.by_view.size(); ++i) sum += a.by_view[i] - b.by_view[i];
+  for (size_t i = 0; i < a.by_view.size(); ++i) squares += std::pow(a.by_view[i] - b.by_view[i] - sum / n, 2);
+  return sum / n <= std::sqrt(squares / (n - 1) / n);
 }
 
-size_t unknowns(const Candidate& candidate) { return candidate.fit.intrinsics.size(); }
-
-// The leanest within one standard error of the best; of two with as many unknowns the regularised one, whose
-// corners do not run away where no board has been.
+// The leanest within one standard error of the best. Only regularised ones compete: what holds a lens
+// together where no board has been is no part of the question how many unknowns it needs.
 void choose(Calibration& calibration) {
   const auto& all = calibration.candidates;
   std::vector<size_t> usable;
   for (size_t i = 0; i < all.size(); ++i) {
-    if (all[i].usable()) usable.push_back(i);
+    if (all[i].usable() && all[i].fit.regularised) usable.push_back(i);
   }
   if (usable.empty()) throw CalibrationError(all.front().failure);
-  const auto leaner = [&](size_t a, size_t b) {
-    return std::pair(unknowns(all[a]), !all[a].fit.regularised) <
-           std::pair(unknowns(all[b]), !all[b].fit.regularised);
-  };
-  std::ranges::stable_sort(usable, leaner);
+  std::ranges::stable_sort(usable, {}, [&](size_t i) { return all[i].fit.intrinsics.size(); });
   calibration.chosen = usable.front();
-  const bool validated =
-      std::ranges::all_of(usable, [&](size_t i) { return all[i].cross_validation.has_value(); });
   if (usable.size() == 1) {
     calibration.why = "It is the only one that was asked for and could be solved.";
     return;
   }
-  if (!validated) {
+  if (!std::ranges::all_of(usable, [&](size_t i) { return all[i].cross_validation.has_value(); })) {
     calibration.why = "There are too few pictures to hold half of them back (" +
                       std::to_string(kFewestToHalve) +
                       " at least), so the leanest model was taken unseen. Take more pictures.";
@@ -181,17 +171,17 @@ void choose(Calibration& calibration) {
   }
   const auto held_out = [&](size_t i) { return all[i].cross_validation->held_out_px; };
   const size_t best = *std::ranges::min_element(usable, {}, held_out);
-  const auto enough = std::ranges::find_if(usable, [&](size_t i) {
-    const auto [mean, error] = compare(all[i].cross_validation->by_view, all[best].cross_validation->by_view);
-    return i == best || mean <= error;
+  calibration.chosen = *std::ranges::find_if(usable, [&](size_t i) {
+    return i == best || is_as_good(*all[i].cross_validation, *all[best].cross_validation);
   });
-  calibration.chosen = *enough;
   const auto told = [&](size_t i) {
     return all[i].name() + " predicts the half of the pictures that it has not seen to " +
-           rounded(held_out(i)) + " px";
+           rounded(held_out(i), "%.4f") + " px";
   };
   calibration.why = told(best);
-  if (calibration.chosen == best) {
+  if (usable.front() == best) {
+    calibration.why += ", the best of all, and it is the leanest.";
+  } else if (calibration.chosen == best) {
     calibration.why += ", better than every leaner model by more than a standard error.";
   } else {
     calibration.why += ", the best of all; but " + told(calibration.chosen) +
@@ -235,21 +225,27 @@ void compare_seeds(const BoardViews& views, const CalibrationOptions& options, C
   }
 }
 
-// Long lenses: the regularisation, made for pixels of some hundred focal lengths, pulls harder than the
-// corners.
+// Long lenses: the regularisation, made for focal lengths of some hundred pixels, pulls harder there than the
+// corners do. Where it moves the lens by more than a sigma and is not what holds it together, the free solve
+// is right.
 void compare_regularisation(const BoardViews& views, Calibration& calibration) {
-  const Candidate& chosen = calibration.best();
-  if (!chosen.fit.regularised) return;
+  const Candidate& held = calibration.best();
   const auto free = std::ranges::find_if(calibration.candidates, [&](const Candidate& c) {
-    return c.usable() && !c.fit.regularised && c.fit.lens == chosen.fit.lens;
+    return c.usable() && !c.fit.regularised && c.fit.lens == held.fit.lens;
   });
   if (free == calibration.candidates.end()) return;
   const auto covered = covered_places(views, kColumns, kRows);
-  const SensorMap sigma = uncertainty_map(chosen.fit, chosen.covariance, kAtInfinity, kColumns, kRows);
-  std::vector<double> weight(covered.begin(), covered.end());
+  const auto sigma = [&](const Candidate& c) {
+    return root_mean_square(uncertainty_map(c.fit, c.covariance, kAtInfinity, kColumns, kRows), covered);
+  };
+  const std::vector<double> weight(covered.begin(), covered.end());
   const double moved = root_mean_square(
-      model_difference(chosen.fit.model(), free->fit.model(), kColumns, kRows, weight).length, covered);
-  if (!(moved > root_mean_square(sigma, covered))) return;
+      model_difference(held.fit.model(), free->fit.model(), kColumns, kRows, weight).length, covered);
+  const double sigma_held = sigma(held);
+  const bool decided = sigma(*free) < 2 * sigma_held;
+  const bool predicts = !held.cross_validation || !free->cross_validation ||
+                        is_as_good(*free->cross_validation, *held.cross_validation);
+  if (!(moved > sigma_held) || !decided || !predicts) return;
   calibration.chosen = static_cast<size_t>(free - calibration.candidates.begin());
   calibration.why += " The regularisation moves it by " + rounded(moved) +
                      " px, more than its standard deviation, so the solve without it was taken.";

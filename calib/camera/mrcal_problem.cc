@@ -194,6 +194,7 @@ mrcal_problem_selections_t everything(const mrcal_lensmodel_t& lens, const FitOp
   // A spline's knots can do all that its focal lengths and centre do.
   s.do_optimize_intrinsics_core = lens.type != MRCAL_LENSMODEL_SPLINED_STEREOGRAPHIC;
   s.do_optimize_intrinsics_distortions = true;
+  s.do_optimize_extrinsics = true;  // of no camera; mrcal's uncertainty refuses a solve without
   s.do_optimize_calobject_warp = options.solve_warp;
   s.do_apply_regularization = options.regularise;
   s.do_apply_outlier_rejection = options.reject_outliers;

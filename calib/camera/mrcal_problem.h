@@ -55,6 +55,7 @@ class MrcalProblem {
 
   void set_poses(const std::vector<LensFit::PoseVector>& camera_from_board);
   void mark_outliers(const LensFit& fit);
+  const std::vector<mrcal_point3_t>& pool() const { return pool_; }
 
  private:
   size_t place(size_t view, const BoardCorner& corner) const;
