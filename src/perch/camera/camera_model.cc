@@ -1,5 +1,6 @@
 #include "perch/camera/camera_model.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
@@ -18,6 +19,7 @@ namespace perch {
 struct CameraModel::Lens {
   std::string name;
   std::vector<double> intrinsics;
+  Eigen::MatrixXd covariance;  // of the intrinsics; empty: unknown
   int width = 0, height = 0;
   mrcal_lensmodel_t model{};
   bool sees_behind = false;          // stereographic, lonlat, latlon, splined: z <= 0 is in view
@@ -217,6 +219,44 @@ std::optional<Eigen::Vector3d> CameraModel::ray_from_pixel(const Eigen::Vector2d
   }
   if (!(miss <= kMaxMiss)) return std::nullopt;
   return ray;
+}
+
+bool CameraModel::pixel_by_intrinsics(const Eigen::Vector3d& p, ByIntrinsics* jacobian) const {
+  const auto count = static_cast<Eigen::Index>(lens_->intrinsics.size());
+  Eigen::Vector2d pixel;
+  if (count > kMostKnownIntrinsics || !lens_->has_gradients || !lens_->project(p, pixel, nullptr))
+    return false;
+  jacobian->resize(2, count);
+  const mrcal_point3_t point{{p.x(), p.y(), p.z()}};
+  mrcal_point2_t q;
+  return mrcal_project(&q, nullptr, jacobian->data(), &point, 1, &lens_->model, lens_->intrinsics.data()) &&
+         jacobian->allFinite();
+}
+
+const Eigen::MatrixXd& CameraModel::intrinsics_covariance() const { return lens_->covariance; }
+
+CameraModel CameraModel::with_intrinsics_covariance(const Eigen::MatrixXd& covariance) const {
+  const auto count = static_cast<Eigen::Index>(lens_->intrinsics.size());
+  if (covariance.rows() != count || covariance.cols() != count || count > kMostKnownIntrinsics) {
+    throw std::invalid_argument(lens_->name + ": expected a covariance of " + std::to_string(count) +
+                                " intrinsics, 16 at most");
+  }
+  if (!covariance.allFinite() || !covariance.isApprox(covariance.transpose(), 1e-9))
+    throw std::invalid_argument(lens_->name + ": expected a covariance that is finite and symmetric");
+  // By correlations: the intrinsics' own sizes lie decades apart. A singular one may be below 0 by rounding.
+  const Eigen::VectorXd sigmas = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::MatrixXd correlation =
+      sigmas.cwiseInverse().asDiagonal() * covariance * sigmas.cwiseInverse().asDiagonal();
+  const bool negative =
+      covariance.diagonal().minCoeff() < 0 ||
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation).eigenvalues().minCoeff() < -1e-6;
+  if (negative)
+    throw std::invalid_argument(lens_->name + ": expected a covariance without negative variances");
+  CameraModel known = *this;
+  auto lens = std::make_shared<Lens>(*lens_);
+  lens->covariance = covariance;
+  known.lens_ = std::move(lens);
+  return known;
 }
 
 int CameraModel::width() const { return lens_->width; }

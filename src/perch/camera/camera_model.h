@@ -46,6 +46,19 @@ class CameraModel {
   // valid in.
   std::optional<Eigen::Vector3d> ray_from_pixel(const Eigen::Vector2d& pixel) const;
 
+  // d pixel / d intrinsics of a point, whatever the lens; false where it is not seen. Without an allocation
+  // for up to kMostKnownIntrinsics of them.
+  using ByIntrinsics = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, 16>;
+  bool pixel_by_intrinsics(const Eigen::Vector3d& p_camera, ByIntrinsics* jacobian) const;
+
+  // How well the intrinsics are known: their covariance, or an empty matrix when nobody has said, as
+  // for lenses of more than kMostKnownIntrinsics.
+  static constexpr int kMostKnownIntrinsics = 16;  // LENSMODEL_OPENCV12; a spline has hundreds
+  const Eigen::MatrixXd& intrinsics_covariance() const;
+  // The same camera with it. Throws std::invalid_argument unless it is square, of a row an intrinsic, finite,
+  // symmetric and nowhere negative.
+  CameraModel with_intrinsics_covariance(const Eigen::MatrixXd& covariance) const;
+
   int width() const;
   int height() const;
   const std::string& lens() const;

@@ -90,6 +90,25 @@ void check_focal(const Section& section, std::string_view key, double fx, double
   section.fail(key, expected.str());
 }
 
+// Ours among mrcal's keys (docs/FORMATS.md): the upper triangle by rows.
+CameraModel with_covariance(const CameraModel& model, Section& file) {
+  constexpr std::string_view kKey = "intrinsics_covariance";
+  if (!file.has(kKey)) return model;
+  const auto n = static_cast<Eigen::Index>(model.intrinsics().size());
+  std::vector<double> triangle;
+  file.read(kKey, triangle, static_cast<size_t>(n * (n + 1) / 2));
+  Eigen::MatrixXd covariance(n, n);
+  size_t next = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index k = i; k < n; ++k) covariance(i, k) = covariance(k, i) = triangle[next++];
+  }
+  try {
+    return model.with_intrinsics_covariance(covariance);
+  } catch (const std::invalid_argument& e) {
+    file.fail(kKey, std::string("what can be one (") + e.what() + ")");
+  }
+}
+
 CameraModel read_mrcal(Section file) {
   std::string lens;
   std::vector<double> intrinsics;
@@ -99,7 +118,7 @@ CameraModel read_mrcal(Section file) {
   const auto [width, height] = read_sizes(file, "imagersize");
   if (intrinsics.size() >= 2) check_focal(file, "intrinsics", intrinsics[0], intrinsics[1]);
   try {
-    return CameraModel(lens, intrinsics, width, height);
+    return with_covariance(CameraModel(lens, intrinsics, width, height), file);
   } catch (const std::invalid_argument& e) {
     file.fail("intrinsics", std::string("what fits the lens (") + e.what() + ")");
   }

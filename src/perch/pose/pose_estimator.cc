@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "perch/geometry/euler.h"
+#include "perch/pose/calibration_covariance.h"
 #include "perch/pose/linear_seed.h"
 #include "perch/pose/planar_ambiguity.h"
 
@@ -78,6 +79,7 @@ PoseOptions read_pose_options(Section pose) {
   pose.read("min_evidence", o.min_evidence, kNotNegative);
   pose.read("gravity_sigma_deg", o.gravity_sigma_deg, kPositive);
   pose.read("same_minimum_deg", o.same_minimum_deg, kNotNegative);
+  pose.read("calibration_uncertainty", o.calibration_uncertainty);
   pose.read("max_iterations", o.max_iterations, Range{1, 1000});
   pose.done();
   return o;
@@ -86,7 +88,10 @@ PoseOptions read_pose_options(Section pose) {
 PoseEstimator::PoseEstimator(const LandingTarget& target, const CameraModel& camera,
                              const PoseOptions& options)
     : camera_(camera), options_(options), errors_(camera) {
-  for (const auto& feature : target.features) features_.push_back(feature.point);
+  for (const auto& feature : target.features) {
+    features_.push_back(feature.point);
+    all_features_.push_back({{feature.point.x(), feature.point.y(), 0}, Eigen::Vector2d::Zero(), 1});
+  }
   solver_.options.max_num_iterations = options.max_iterations;
   solver_.options.gradient_tolerance = 1e-9;
 }
@@ -227,6 +232,7 @@ PoseResult PoseEstimator::estimate(std::span<const Correspondence> correspondenc
   std::optional<Minimum> best = minimum_at(descent->camera_from_target);
   if (!best) return result;
   decide(*best, second_minimum(*best), hints, result);
+  add_calibration(observations_, result);
   return result;
 }
 
@@ -263,6 +269,17 @@ void PoseEstimator::decide(Minimum best, std::optional<Minimum> second, std::spa
   const bool harmless = turn.norm() < options_.same_minimum_deg * kRadFromDeg ||
                         (hinted && turn.dot(of_turn.ldlt().solve(turn)) < kSameWithinNoise);
   if (!decided && !harmless) result.status = PoseStatus::kAmbiguous;
+}
+
+// After the decision: a wrong lens is wrong at both minima alike and tells nothing of which is the right one.
+void PoseEstimator::add_calibration(std::span<const Observation> observations, PoseResult& result) const {
+  const bool posed = result.status == PoseStatus::kOk || result.status == PoseStatus::kAmbiguous;
+  if (!posed || !options_.calibration_uncertainty) return;
+  const auto add = [&](UncertainRigid3& pose) {
+    pose.covariance += calibration_covariance(camera_, observations, pose.mean);
+  };
+  add(result.camera_from_target);
+  if (result.second) add(*result.second);
 }
 
 // A minimum of the edges' distances.
@@ -346,6 +363,7 @@ PoseResult PoseEstimator::estimate(const PlaneMeasurement& measured, std::span<c
   // Not "greater than": a NaN is refused too.
   if (!(best->rms_px <= kMostEdgeRms)) return result;
   decide(*best, second, hints, result);
+  add_calibration(all_features_, result);
   return result;
 }
 

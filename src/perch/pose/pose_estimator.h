@@ -36,6 +36,8 @@ struct PoseOptions {
   double gravity_sigma_deg = 3;
   // Minima closer than this are not worth a word: the covariance takes both in.
   double same_minimum_deg = 5;
+  // Whether the covariance takes in how well the camera is calibrated, of a model that says so.
+  bool calibration_uncertainty = true;
   int max_iterations = 50;  // five are normal; in the flat valley of a face seen straight on, 30
 };
 
@@ -92,6 +94,7 @@ class PoseEstimator {
   std::optional<Minimum> descend(const PlaneMeasurement& plane, const Rigid3& start);
   void decide(Minimum best, std::optional<Minimum> second, std::span<const NormalHint> hints,
               PoseResult& result) const;
+  void add_calibration(std::span<const Observation> observations, PoseResult& result) const;
   void observe(std::span<const Correspondence> correspondences);
   std::optional<Rigid3> best_seed();
   std::optional<Descent> descend(const Rigid3& start, double huber, double tolerance);
@@ -102,6 +105,7 @@ class PoseEstimator {
   std::optional<Minimum> other_end_of_valley(const Minimum& best, const MinimumAt& at) const;
 
   std::vector<Eigen::Vector2d> features_;
+  std::vector<Observation> all_features_;  // of edges: their places alone
   CameraModel camera_;
   PoseOptions options_;
   std::vector<Observation> observations_;
