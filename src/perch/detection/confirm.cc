@@ -41,7 +41,13 @@ Confirmation::Confirmation(const LandingTarget& target, const TargetEdges& edges
       camera_(camera),
       grey_order_(edges, camera),
       size_(target.size),
-      tallies_(edges.edges.size()) {}
+      tallies_(edges.edges.size()) {
+  smallest_.fill(target.size);
+  for (const TargetShape& shape : edges.shapes) {
+    double& smallest = smallest_[shape.inner];
+    if (shape.kind == ShapeKind::kSquare) smallest = std::min(smallest, shape.side);
+  }
+}
 
 bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const Requirement& requirement) {
   // Edges too short or too near each other to be told apart are judged by the grey beside them.
@@ -83,6 +89,57 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
          found >= requirement.found * asked;
 }
 
+// The pixel where a point of the plane is seen; empty where it is not in the picture.
+std::optional<int> Confirmation::grey_at(const cv::Mat& grey, const Eigen::Matrix3d& H,
+                                         const Eigen::Vector2d& point) const {
+  const Eigen::Vector3d p = H * point.homogeneous();
+  const auto pixel = p.z() > 0 ? camera_.pixel_from_camera(p) : std::nullopt;
+  if (!pixel ||
+      !(pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= grey.cols - 1 && pixel->y() <= grey.rows - 1)) {
+    return std::nullopt;
+  }
+  return grey.at<uint8_t>(static_cast<int>(std::lround(pixel->y())),
+                          static_cast<int>(std::lround(pixel->x())));
+}
+
+// Whether there is a white square beside the place of ours: white on both sides of one of its edges, black on
+// both sides of another. Something pale that covers a part of it leaves none of the rest black, something
+// black makes nothing white.
+bool Confirmation::is_beside(const cv::Mat& grey, const Eigen::Matrix3d& H, const TargetShape& square,
+                             double contrast) const {
+  constexpr int kSides = 4, kPoints = 3;
+  constexpr double kWhite = 0.7, kBlack = 0.2, kFull = 0.6;  // of the contrast
+  const double half = 0.5 * square.side, off = 0.25 * smallest_[square.inner];
+  std::array<std::array<std::optional<int>, 2 * kPoints>, kSides> seen;
+  int low = 255, high = 0;
+  for (size_t side = 0; side < kSides; ++side) {
+    const Eigen::Vector2d out = side % 2 == 0 ? Eigen::Vector2d::UnitX() : Eigen::Vector2d::UnitY();
+    const Eigen::Vector2d normal = side < 2 ? out : Eigen::Vector2d(-out), along(-normal.y(), normal.x());
+    for (size_t k = 0; k < 2 * kPoints; ++k) {
+      const double across = half + (k < kPoints ? -off : off);
+      const double t = (static_cast<double>(k % kPoints) - 1) * (half - off);
+      seen[side][k] = grey_at(grey, H, square.centre + across * normal + t * along);
+      if (!seen[side][k]) continue;
+      low = std::min(low, *seen[side][k]);
+      high = std::max(high, *seen[side][k]);
+    }
+  }
+  if (high - low < kFull * contrast) return false;
+  bool white = false, black = false;
+  for (const auto& side : seen) {
+    int both_white = 0, both_black = 0;
+    for (size_t k = 0; k < kPoints; ++k) {
+      if (!side[k] || !side[k + kPoints]) continue;
+      const auto [darker, brighter] = std::minmax({*side[k], *side[k + kPoints]});
+      both_white += darker > low + kWhite * (high - low);
+      both_black += brighter < low + kBlack * (high - low);
+    }
+    white = white || 2 * both_white > kPoints;
+    black = black || 2 * both_black > kPoints;
+  }
+  return white && black;
+}
+
 // The brightest of nine pixels in the middle of a square's place, and the mean of eight around it, a quarter
 // of its side off; of those that are in the picture. Empty where these are few.
 std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const Eigen::Matrix3d& H,
@@ -96,14 +153,9 @@ std::optional<SquareLevels> Confirmation::levels_of(const cv::Mat& grey, const E
       for (const double far : {0.3, 0.75}) {
         if (u == 0 && v == 0 && far > 0.5) continue;
         const Eigen::Vector2d q = square.centre + far * square.side * Eigen::Vector2d(u, v);
-        const Eigen::Vector3d p = H * q.homogeneous();
-        const auto pixel = p.z() > 0 ? camera_.pixel_from_camera(p) : std::nullopt;
-        if (!pixel || !(pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= grey.cols - 1 &&
-                        pixel->y() <= grey.rows - 1)) {
-          continue;
-        }
-        const double value = grey.at<uint8_t>(static_cast<int>(std::lround(pixel->y())),
-                                              static_cast<int>(std::lround(pixel->x())));
+        const auto seen = grey_at(grey, H, q);
+        if (!seen) continue;
+        const double value = *seen;
         if (far < 0.5) {
           levels.inside = std::max(levels.inside, value);
           ++inside;
@@ -155,6 +207,7 @@ bool Confirmation::is_layout(const cv::Mat& grey, const Eigen::Matrix3d& H) cons
 
 std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                                double radius, const Requirement& requirement) {
+  contradicted_ = false;
   Confirmed result;
   result.image_from_plane = towards_camera(image_from_plane);
   SearchOptions search;
@@ -197,7 +250,11 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
     widths_.push_back(steps_[i].width);
   }
   const Eigen::Matrix3d& H = result.image_from_plane;
-  if (!is_met(grey, H, requirement) || !is_layout(grey, H)) return std::nullopt;
+  if (!is_met(grey, H, requirement)) return std::nullopt;
+  contradicted_ = std::ranges::any_of(target_.shapes, [&](const TargetShape& shape) {
+    return shape.kind == ShapeKind::kSquare && is_beside(grey, H, shape, result.contrast);
+  });
+  if (contradicted_ || !is_layout(grey, H)) return std::nullopt;
   for (const EdgeTally& tally : tallies_) {
     result.found += tally.found;
     result.asked += tally.asked;

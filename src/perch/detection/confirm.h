@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <bitset>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -52,16 +53,25 @@ class Confirmation {
   std::optional<Confirmed> confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                    double radius, const Requirement& requirement);
 
+  // Whether the last picture was clearly that of another panel: its squares lie beside the places of ours.
+  bool is_contradicted() const { return contradicted_; }
+
  private:
   bool is_met(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, const Requirement& requirement);
   std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                         const TargetShape& square) const;
+  std::optional<int> grey_at(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
+                             const Eigen::Vector2d& point) const;
+  bool is_beside(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, const TargetShape& square,
+                 double contrast) const;
   bool is_layout(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane) const;
 
   TargetEdges target_;
   CameraModel camera_;
   GreyOrder grey_order_;
-  double size_;
+  double size_;                       // m
+  std::array<double, 2> smallest_{};  // square of the target, of the nested one in it, m
+  bool contradicted_ = false;
   std::vector<EdgePiece> pieces_;
   std::vector<EdgeOffset> offsets_;
   std::vector<FoundStep> steps_;

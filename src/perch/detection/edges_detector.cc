@@ -187,8 +187,8 @@ void EdgesDetector::Work::search(const cv::Mat& grey, Stopwatch& stopwatch) {
     halve(*last, halves[k].grey);
     last = &halves[k].grey;
     search_means(*last, halves[k].regions, stopwatch);
-    for (Confirmed& found : confirmed) {
-      // At full size, if that is not where it drowns in noise.
+    // At full size, if that is not where it drowns in noise.
+    std::erase_if(confirmed, [&](Confirmed& found) {
       const double radius = 2 << k;
       const Requirement requirement{kLeastSquares, 2, options.min_found, options.min_contrast};
       if (const auto sharper = confirmation.confirm(grey, found.image_from_plane, radius, requirement)) {
@@ -196,7 +196,8 @@ void EdgesDetector::Work::search(const cv::Mat& grey, Stopwatch& stopwatch) {
       } else {
         found.blur = std::clamp(found.blur * (2 << k), 0.5, 3.0);
       }
-    }
+      return confirmation.is_contradicted();
+    });
   }
 }
 
