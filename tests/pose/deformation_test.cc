@@ -110,8 +110,8 @@ TEST(Deformation, LeavesNoMoreThanItAllows) {
 
 TEST(Deformation, OneWildFrameIsForgotten) {
   Deformation usual;
-  usual.add(25, 1e3);  // 5 px by a bad fit
-  for (int i = 0; i < 100; ++i) usual.add(0, 1e6);
+  usual.add(25, 1e3, 0);  // 5 px by a bad fit
+  for (int i = 0; i < 100; ++i) usual.add(0, 1e6, 0);
   EXPECT_LT(usual.px2(), 0.01 * 0.01);
 }
 

@@ -28,8 +28,8 @@ void learn(const PlaneInformation& root, const Eigen::Matrix<double, 8, 6>& J, d
   // for is a part; the frame's own adds to that: some hundredths of a pixel are no less sure than
   // thousandths.
   if (!(trace > 0) || !std::isfinite(squares)) return;
-  const double spread = std::max(1 / trace - deformation.px2(), 0.0) + 1e-3;
-  deformation.add(deformation.px2() + (squares - kSpare) / trace, 1 / (spread * spread));
+  const double of_noise = std::max(1 / trace - deformation.px2(), 0.0), spread = of_noise + 1e-3;
+  deformation.add(deformation.px2() + (squares - kSpare) / trace, 1 / (spread * spread), 2 * of_noise);
 }
 
 }  // namespace perch

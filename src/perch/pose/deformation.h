@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 
 #include "perch/camera/camera_model.h"
 #include "perch/detection/detector.h"
@@ -15,17 +16,22 @@ namespace perch {
 // goes on.
 class Deformation {
  public:
-  double px2() const { return std::max(mean_, 0.0); }
+  // As much of it as the frames show: what is less than the mean's own deviation is their noise.
+  double px2() const { return std::max(mean_ - std::sqrt(variance_), 0.0); }
 
-  // A frame's own estimate, without bias and so maybe below zero, and its weight, one over its variance.
-  void add(double px2, double weight) {
+  // A frame's own estimate, without bias and so maybe below zero, its weight, and the deviation that noise
+  // alone gives it.
+  void add(double px2, double weight, double noise) {
     constexpr double kMemory = 16;  // frames
     weight_ = (1 - 1 / kMemory) * weight_ + weight;
-    if (weight_ > 0) mean_ += (px2 - mean_) * weight / weight_;
+    if (!(weight_ > 0)) return;
+    const double part = weight / weight_;
+    mean_ += part * (px2 - mean_);
+    variance_ = (1 - part) * (1 - part) * variance_ + part * part * noise * noise;
   }
 
  private:
-  double mean_ = 0, weight_ = 4e6;
+  double mean_ = 0, weight_ = 4e6, variance_ = 0;
 };
 
 // One px of such a deformation in units of a PlaneStep.
