@@ -16,7 +16,7 @@ FlightAids::FlightAids(const Flight& flight, const FrameChain& chain, const RunC
 Estimator::Aid FlightAids::at(int64_t camera_time_ns) {
   Estimator::Aid aid = recorded_ ? recorded_->at(camera_time_ns) : from_flight(camera_time_ns);
   ++frames_;
-  headless_ += head_is_unknown(chain_, aid.angles);
+  headless_ += !knows_camera(chain_, aid.angles);
   return aid;
 }
 

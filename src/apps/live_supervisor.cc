@@ -207,8 +207,8 @@ class Supervisor {
       if (!problem.empty()) event("camera: " + problem);
     }
     // The first alone: of a full disk each picture tells anew. How many it costs is said every 10 s.
-    if (recorder_ && !told_recording_) {
-      const std::string problem = recorder_->counters().last_problem;
+    if (const auto recorder = recording_.recorder(); recorder && !told_recording_) {
+      const std::string problem = recorder->counters().last_problem;
       told_recording_ = !problem.empty();
       if (told_recording_) LOG(WARNING) << "recording: " << problem;
     }
