@@ -40,8 +40,6 @@ TEST(LivePtz, FollowsThePadThroughASimulatedHead) {
   ChildProgram live(live_folder, PERCH_LIVE, {"--config", folder / "live.yaml", "--summary", summary});
   ASSERT_EQ(live.wait(60), 0) << live.err();
   const auto json = nlohmann::json::parse(read_file(summary));
-  std::printf("%s\n", json["ptz"].dump().c_str());
-  std::printf("%s\n", json["status"].dump().c_str());
   EXPECT_TRUE(json["ptz"]["ready"]);
   EXPECT_GT(json["ptz"]["positions"], 50);
   EXPECT_GT(json["ptz"]["followed"], 20);

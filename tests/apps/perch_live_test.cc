@@ -235,7 +235,9 @@ TEST_F(PerchLive, RefusesAWrongConfigurationWithItsPlace) {
     EXPECT_EQ(outcome.code, 2) << set;
     return outcome.err;
   };
-  EXPECT_THAT(error_of("outputs.station.listen=8080"), HasSubstr("outputs.station: expected one of"));
+  EXPECT_THAT(error_of("outputs.stations.listen=8080"), HasSubstr("outputs.stations: expected one of"));
+  EXPECT_THAT(error_of("outputs.station.listen=8080"),
+              HasSubstr("outputs.station.listen: expected ADDRESS:PORT"));
   EXPECT_THAT(error_of("nav=udp:1:2"), HasSubstr("nav: expected none, flight or mavlink+URL"));
   EXPECT_THAT(error_of("nav=mavlink+udp:host"), HasSubstr("expected HOST:PORT"));
   EXPECT_THAT(error_of("nav=none"),
