@@ -72,6 +72,31 @@ std::vector<std::string> names_of(const MountProblem& problem, const MountState&
 
 }  // namespace
 
+void check_converged(ceres::Problem& least_squares, const std::string& on, double limit) {
+  ceres::Problem::EvaluateOptions options;
+  options.num_threads = 2;
+  std::vector<double> residuals;
+  ceres::CRSMatrix crs;
+  if (!least_squares.Evaluate(options, nullptr, &residuals, nullptr, &crs)) {
+    throw MountError("the least squares on " + on + " have no derivative where they ended");
+  }
+  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> rows(
+      crs.num_rows, crs.num_cols, static_cast<Eigen::Index>(crs.values.size()), crs.rows.data(),
+      crs.cols.data(), crs.values.data());
+  const Sparse J(rows);
+  const Eigen::VectorXd gradient =
+      J.transpose() * Eigen::Map<const Eigen::VectorXd>(residuals.data(), crs.num_rows);
+  Sparse H = J.transpose() * J;
+  // What is not told at all has no gradient either, and must not divide by nothing.
+  const Eigen::VectorXd damping = 1e-9 * H.diagonal().array() + 1e-12;
+  H += Sparse(damping.asDiagonal());
+  const Eigen::SimplicialLDLT<Sparse> ldlt(H);
+  const double gain = ldlt.info() == Eigen::Success ? gradient.dot(ldlt.solve(gradient)) : NAN;
+  if (gain < limit) return;
+  throw MountError("the least squares on " + on + " did not converge: another step would gain " +
+                   std::to_string(gain) + " in chi-square");
+}
+
 void measure_information(ceres::Problem& least_squares, UnknownBlocks& unknowns,
                          const std::vector<ceres::ResidualBlockId>& priors, const MountProblem& problem,
                          MountSolution& solution) {

@@ -67,13 +67,14 @@ void build(const MountProblem& problem, const MountSolution& solution, ceres::Lo
 void solve(ceres::Problem& problem) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
-  options.max_num_iterations = 30;
+  options.max_num_iterations = 100;
   options.num_threads = 2;
   options.function_tolerance = 1e-9;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   if (!summary.IsSolutionUsable()) throw MountError("the least squares failed: " + summary.message);
+  check_converged(problem, "pixels", 0.1);
 }
 
 void bundle_adjust(const MountProblem& problem, MountSolution& solution) {

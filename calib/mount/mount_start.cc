@@ -75,7 +75,12 @@ void check_motion(const MountFlight& flight) {
 
 FlightStart best_offset(const MountProblem& problem, const MountFlight& flight, Trajectory trajectory) {
   FlightStart best{std::move(trajectory), {}, problem.nominal_offset, {}};
-  const int steps = static_cast<int>(std::ceil(problem.options.offset_reach / kOffsetStep));
+  // A prior says where to look as well.
+  const MountPriors& priors = problem.options.priors;
+  const double middle = priors.time_offset.value_or(problem.nominal_offset);
+  const double reach =
+      std::min(problem.options.offset_reach, 3 * priors.time_offset_sigma.value_or(INFINITY));
+  const int steps = static_cast<int>(std::ceil(reach / kOffsetStep));
   size_t most = 0;
   struct Tried {
     double offset;
@@ -84,7 +89,7 @@ FlightStart best_offset(const MountProblem& problem, const MountFlight& flight, 
   };
   std::vector<Tried> tried;
   for (int k = -steps; k <= steps; ++k) {
-    const double offset = problem.nominal_offset + k * kOffsetStep;
+    const double offset = middle + k * kOffsetStep;
     const auto pairs = hand_eye_pairs(problem, flight, best.trajectory, offset, kPairs);
     if (pairs.size() < 4) continue;
     tried.push_back({offset, solve_hand_eye(pairs, problem.nominal_mount), pairs.size()});

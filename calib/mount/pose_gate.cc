@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/mount/mount_covariance.h"
 #include "calib/mount/navigation_noise.h"
+#include "perch/flight/head_angles.h"
 #include "perch/geometry/euler.h"
 
 namespace perch {
@@ -15,6 +17,21 @@ namespace {
 constexpr double kGate = 22.46;     // chi-square of 6 degrees of freedom at 0.999
 constexpr size_t kMostPoses = 600;  // a flight, in this step: the rest only waits for the gate
 constexpr int kRounds = 4;          // of noise and fit; the noise stands after two
+// How far a time may still move: the start is within half a step of its grid (10 ms). A head's latency, 50
+// ms.
+constexpr int64_t kOffsetReach = 30'000'000, kLatencyReach = 100'000'000;  // ns
+
+// Not at an end or gap of navigation or of the head's readings: a picture there would lose its prediction as
+// soon as the offset moved, and the least squares refuse every step that does so.
+bool is_inside(const MountProblem& problem, const MountFlight& flight, const Trajectory& trajectory,
+               int64_t camera_ns, double offset) {
+  const int64_t navigation_ns = camera_ns - std::llround(1e9 * offset);
+  for (const int sign : {-1, 1}) {
+    if (!trajectory.at(navigation_ns + sign * kOffsetReach)) return false;
+    if (problem.chain.head && !head_angles_at(flight.gimbal, camera_ns + sign * kLatencyReach)) return false;
+  }
+  return true;
+}
 
 Matrix6d navigation_covariance(const NavigationNoise& noise, double part) {
   Vector6d variance;
@@ -29,6 +46,10 @@ std::optional<SightPrediction> predict(const MountProblem& problem, const MountS
                                        size_t i) {
   const MountState& s = solution.state;
   const MountFlight& flight = problem.flights[f];
+  if (!is_inside(problem, flight, solution.flights[f].trajectory, flight.sightings[i].timestamp_ns,
+                 s.offsets[offset_of_flight(s, f)])) {
+    return std::nullopt;
+  }
   return predict_sight(
       {problem.chain, solution.flights[f].trajectory, flight.gimbal, flight.sightings[i].timestamp_ns},
       s.mount, s.pads[pad_of_flight(s, f)], s.offsets[offset_of_flight(s, f)], s.head);
@@ -64,17 +85,20 @@ void fit_poses(const MountProblem& problem, MountSolution& solution, bool free_h
     }
   }
   if (least_squares.NumResidualBlocks() < 4)
-    throw MountError("fewer than 4 pictures within navigation's time");
+    throw MountError(
+        "fewer than 4 pictures lie within navigation's time (30 ms and more from its ends and gaps)");
   unknowns.add_manifolds(least_squares, manifold);
   add_priors(problem.options.priors, unknowns, least_squares);
   if (problem.chain.head && !free_head) least_squares.SetParameterBlockConstant(unknowns.head());
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = 50;
+  options.max_num_iterations = 100;
+  options.function_tolerance = 1e-9;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &least_squares, &summary);
   if (!summary.IsSolutionUsable()) throw MountError("the least squares on poses failed: " + summary.message);
+  check_converged(least_squares, "poses", 1);  // Cauchy's loss is slow at the end, and only the gate follows
   solution.state = unknowns.state(solution.state);
 }
 

@@ -1,6 +1,5 @@
 #include "calib/camera/lens_fit.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,13 +27,10 @@ TEST(LensFit, FindsTheLensAndTheBendWithinThreeSigma) {
   for (Eigen::Index i = 0; i < 8; ++i) {
     const auto k = static_cast<size_t>(i);
     const double sigma = std::sqrt(covariance.matrix(i, i));
-    std::cout << i << " " << found.intrinsics[k] << " " << camera.intrinsics()[k] << " +- " << sigma << "\n";
     EXPECT_NEAR(found.intrinsics[k], camera.intrinsics()[k], 3 * sigma) << i;
   }
   EXPECT_NEAR(found.warp.x(), boards.warp.x(), 3 * covariance.warp_sigma.x());
   EXPECT_NEAR(found.warp.y(), boards.warp.y(), 3 * covariance.warp_sigma.y());
-  std::cout << found.warp.transpose() << " +- " << covariance.warp_sigma.transpose() << " outliers "
-            << found.outliers << " rms " << found.rms_px << "\n";
 }
 
 }  // namespace

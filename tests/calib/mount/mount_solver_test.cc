@@ -141,5 +141,27 @@ TEST(MountSolver, RefusesWhatTellsNothing) {
   EXPECT_THAT(error_of(blind), HasSubstr("found in 2 pictures"));
 }
 
+// Exact navigation at the pictures' own rate that begins and ends with them: the first and last picture lie
+// where a later or earlier offset has no navigation. With them in it no step was ever accepted, and the start
+// came out.
+TEST(MountSolver, DoesNotStandStillBecauseOfNavigationsEnds) {
+  TestRng rng;
+  MountWorld world;
+  world.duration = 6;
+  world.nav_rate = world.camera_rate = 30;
+  world.position_noise = world.rotation_noise = 0;
+  world.time_offset = 0;
+  MountProblem p = world.problem(rng);
+  MountFlight& flight = p.flights[0];
+  flight.nav.samples.clear();
+  for (const Sighting& s : flight.sightings) {
+    const double t = 1e-9 * static_cast<double>(s.timestamp_ns - 1'700'000'000'000'000'000);
+    flight.nav.samples.push_back({s.timestamp_ns, world.world_from_body(t), Eigen::Vector3d::Zero()});
+  }
+  const MountSolution s = solve_mount(p);
+  EXPECT_FALSE(s.flights[0].used.front());
+  EXPECT_THAT(s.state.mount, IsNearPose(world.body_from_base, 0.05 * kRadFromDeg, 0.005));
+}
+
 }  // namespace
 }  // namespace perch
