@@ -3,18 +3,17 @@
 #include <gflags/gflags.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
 #include <iostream>
-#include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 #include <thread>
 
 #include "perch/simulation/flight_folder.h"
 #include "program.h"
+#include "progress.h"
 
 DEFINE_string(config, "", "the simulation, a YAML file; see configs/simulation");
 DEFINE_string(output, "", "the folder to write the flight into");
@@ -32,30 +31,6 @@ the target's true pose. OUTPUT/perch.yaml is a configuration for perch-batch. Th
 same bytes, whatever --jobs.)";
 
 std::atomic<bool> interrupted = false;
-
-// Counts frames: a line that renews itself on a terminal, a line for every tenth elsewhere.
-class Progress {
- public:
-  explicit Progress(int64_t frames) : frames_(frames), terminal_(isatty(STDERR_FILENO) == 1) {}
-  ~Progress() {
-    if (terminal_ && done_ > 0) std::cerr << '\n';
-  }
-  void one_more() {
-    const std::lock_guard lock(mutex_);
-    ++done_;
-    const bool tenth = done_ * 10 / frames_ != (done_ - 1) * 10 / frames_;
-    if (terminal_) {
-      std::cerr << "\rframe " << done_ << " of " << frames_ << std::flush;
-    } else if (tenth) {
-      std::cerr << "frame " << done_ << " of " << frames_ << '\n';
-    }
-  }
-
- private:
-  std::mutex mutex_;
-  int64_t frames_, done_ = 0;
-  bool terminal_;
-};
 
 int run(const perch::CommandLine& line) {
   if (!line.arguments.empty())
@@ -83,11 +58,12 @@ int run(const perch::CommandLine& line) {
   const auto jobs = FLAGS_jobs > 0 ? static_cast<unsigned>(FLAGS_jobs) : std::thread::hardware_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::max(1U, jobs));
   {
-    Progress progress(flight.frames());
+    perch::Progress progress;
+    std::atomic<int64_t> done = 0;
     tbb::parallel_for(int64_t{0}, flight.frames(), [&](int64_t frame) {
       if (interrupted) return;
       folder.write_frame(flight, frame);
-      progress.one_more();
+      progress.at(static_cast<double>(++done) / static_cast<double>(flight.frames()), "rendering");
     });
   }
   if (interrupted) throw std::runtime_error("interrupted; nothing is kept");
