@@ -1,0 +1,1 @@
+// Nothing: cmake/Perch.cmake precompiles headers with it.
