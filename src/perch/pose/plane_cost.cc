@@ -32,11 +32,11 @@ PlaneInformation root_of(const PlaneInformation& information) {
 
 }  // namespace
 
-PlaneCost::PlaneCost(const PlaneMeasurement& plane, const Rigid3& base)
-    : base_(base),
-      from_image_(plane.frame.from_image()),
-      to_frame_(plane.image_from_plane.inverse() * plane.frame.to_image()),
-      root_(root_of(plane.information)) {}
+WhitenedPlane::WhitenedPlane(const PlaneMeasurement& plane)
+    : measured(plane),
+      from_image(plane.frame.from_image()),
+      to_frame(plane.image_from_plane.inverse() * plane.frame.to_image()),
+      root(root_of(plane.information)) {}
 
 Rigid3 PlaneCost::pose(const Parameters& x) const {
   if (x.isZero(0)) return base_;
@@ -47,31 +47,32 @@ bool PlaneCost::operator()(const double* parameters, double* residuals, double* 
   const Parameters x(parameters);
   const Rigid3 at = pose(x);
   const Eigen::Matrix3d R = at.rotation.toRotationMatrix();
-  const Eigen::Matrix3d N = from_image_ * homography_of(R, at.translation) * to_frame_;
+  const auto& [measured, from_image, to_frame, root] = plane_;
+  const Eigen::Matrix3d N = from_image * homography_of(R, at.translation) * to_frame;
   Eigen::Map<PlaneStep> f(residuals);
   if (!(at.translation.z() > 0) || !(std::abs(N(2, 2)) > 1e-12)) {
     f.setConstant(1e6);
     return false;
   }
   // By coefficients: Eigen's product for large matrices takes thrice as long for these.
-  f = root_.lazyProduct(step_of(N / N(2, 2) - Eigen::Matrix3d::Identity()));
+  f = root.lazyProduct(step_of(N / N(2, 2) - Eigen::Matrix3d::Identity()));
   if (!jacobian) return true;
   Eigen::Map<Jacobian> J(jacobian);
   Jacobian by_x;
   const Eigen::Matrix3d left = so3_left_jacobian(x.tail<3>());
   for (int i = 0; i < 6; ++i) {
-    Eigen::Matrix3d by_i = Eigen::Matrix3d::Zero();
+    // Of the homography a translation moves the last column, a rotation the first two.
+    Eigen::Matrix3d dN;
     if (i < 3) {
-      by_i(i, 2) = 1;
+      dN = from_image.col(i) * to_frame.row(2);
     } else {
       const Eigen::Vector3d axis = left.col(i - 3);
-      by_i.col(0) = axis.cross(R.col(0));
-      by_i.col(1) = axis.cross(R.col(1));
+      dN = (from_image * axis.cross(R.col(0))) * to_frame.row(0) +
+           (from_image * axis.cross(R.col(1))) * to_frame.row(1);
     }
-    const Eigen::Matrix3d dN = from_image_ * by_i * to_frame_;
     by_x.col(i) = step_of((dN - N * (dN(2, 2) / N(2, 2))) / N(2, 2));
   }
-  J = root_.lazyProduct(by_x);
+  J = root.lazyProduct(by_x);
   return true;
 }
 

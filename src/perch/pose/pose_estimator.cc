@@ -283,7 +283,7 @@ void PoseEstimator::add_calibration(std::span<const Observation> observations, P
 }
 
 // A minimum of the edges' distances.
-std::optional<PoseEstimator::Minimum> PoseEstimator::descend(const PlaneMeasurement& plane,
+std::optional<PoseEstimator::Minimum> PoseEstimator::descend(const WhitenedPlane& plane,
                                                              const Rigid3& start) {
   const PlaneCost cost(plane, start);
   PlaneCost::Parameters x = PlaneCost::Parameters::Zero();
@@ -294,7 +294,7 @@ std::optional<PoseEstimator::Minimum> PoseEstimator::descend(const PlaneMeasurem
 
 // What the homography fits better than any pose of a rigid target, two degrees of freedom, tells of the lens
 // model, the print and the noise.
-std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const PlaneMeasurement& plane,
+std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const WhitenedPlane& plane,
                                                                 const Rigid3& camera_from_target) const {
   Minimum minimum;
   minimum.camera_from_target.mean = camera_from_target;
@@ -304,8 +304,8 @@ std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const PlaneMeasu
   if (!there(PlaneCost::Parameters::Zero().eval().data(), residuals.data(), J.data())) return std::nullopt;
   minimum.cost = residuals.squaredNorm();
   minimum.variance = std::max(1.0, (kPriorFreedom + minimum.cost) / (kPriorFreedom + 2));
-  const double misfit = std::sqrt(minimum.cost / std::max(1, plane.edges)) * plane.sigma_px;
-  minimum.rms_px = std::hypot(plane.rms_px, misfit);
+  const double misfit = std::sqrt(minimum.cost / std::max(1, plane.measured.edges)) * plane.measured.sigma_px;
+  minimum.rms_px = std::hypot(plane.measured.rms_px, misfit);
   minimum.rms_sigmas = options_.max_rms_sigmas * misfit / options_.max_misfit_px;
   const PoseCovariance information = J.transpose() * J;
   const Eigen::LDLT<PoseCovariance> ldlt(information);
@@ -319,9 +319,10 @@ PoseResult PoseEstimator::estimate(const PlaneMeasurement& measured, std::span<c
                                    const Deformation& usual) {
   PoseResult result;
   const double per_px = step_per_px(measured, camera_);
-  PlaneMeasurement plane = measured;
-  plane.information = deformed(measured.information, usual.px2(), per_px);
-  result.features = plane.edges;
+  PlaneMeasurement softened = measured;
+  softened.information = deformed(measured.information, usual.px2(), per_px);
+  const WhitenedPlane plane(softened);
+  result.features = measured.edges;
   // The linear seed where the perspective shows; else both poses of the first order.
   std::optional<Minimum> best, second;
   const auto consider = [&](const Rigid3& seed) {
@@ -339,7 +340,7 @@ PoseResult PoseEstimator::estimate(const PlaneMeasurement& measured, std::span<c
       second = minimum;
     }
   };
-  const PlaneView view{plane.image_from_plane, Eigen::Vector2d::Zero()};
+  const PlaneView view{measured.image_from_plane, Eigen::Vector2d::Zero()};
   if (const auto pair = infinitesimal_poses(view)) std::ranges::for_each(*pair, consider);
   if (!best || !second) {
     if (const auto seed = linear_seed(view)) consider(*seed);
@@ -353,10 +354,11 @@ PoseResult PoseEstimator::estimate(const PlaneMeasurement& measured, std::span<c
   PlaneCost::Jacobian J;
   const PlaneCost there(plane, best->camera_from_target.mean);
   there(PlaneCost::Parameters::Zero().eval().data(), residuals.data(), J.data());
-  learn(there.root(), J, residuals.squaredNorm(), per_px, result.deformation);
-  plane.information = deformed(measured.information, result.deformation.px2(), per_px);
+  learn(plane.root, J, residuals.squaredNorm(), per_px, result.deformation);
+  softened.information = deformed(measured.information, result.deformation.px2(), per_px);
+  const WhitenedPlane with_own(softened);
   for (auto* minimum : {&best, &second}) {
-    if (*minimum) *minimum = minimum_at(plane, (*minimum)->camera_from_target.mean);
+    if (*minimum) *minimum = minimum_at(with_own, (*minimum)->camera_from_target.mean);
   }
   if (!best) return result;
   result.reprojection_rms_px = best->rms_px;

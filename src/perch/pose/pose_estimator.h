@@ -91,7 +91,7 @@ class PoseEstimator {
     double variance = 1;                // of the noise in stated ones: psi^2 a degree of freedom
     double bend = 1;                    // mean of psi', 1 when no error is beyond the bound
   };
-  std::optional<Minimum> descend(const PlaneMeasurement& plane, const Rigid3& start);
+  std::optional<Minimum> descend(const WhitenedPlane& plane, const Rigid3& start);
   void decide(Minimum best, std::optional<Minimum> second, std::span<const NormalHint> hints,
               PoseResult& result) const;
   void add_calibration(std::span<const Observation> observations, PoseResult& result) const;
@@ -100,7 +100,7 @@ class PoseEstimator {
   std::optional<Descent> descend(const Rigid3& start, double huber, double tolerance);
   std::optional<Minimum> minimum_at(const Rigid3& camera_from_target);
   std::optional<Minimum> second_minimum(const Minimum& best);
-  std::optional<Minimum> minimum_at(const PlaneMeasurement& plane, const Rigid3& camera_from_target) const;
+  std::optional<Minimum> minimum_at(const WhitenedPlane& plane, const Rigid3& camera_from_target) const;
   template <typename MinimumAt>
   std::optional<Minimum> other_end_of_valley(const Minimum& best, const MinimumAt& at) const;
 
