@@ -13,8 +13,9 @@ namespace perch {
 //
 //   L_i' = -L_i / memory,   L_i += log N(y; 0, S_i) at each measurement,
 //
-// where another one takes over only when it leads clearly, so that the choice does not flutter. One that is
-// surprised beyond the gate by what another one expected is wrong, and goes on from that other one's state.
+// where another one takes over only when it leads clearly, so that the choice does not flutter, and not in
+// the first second. One that is surprised beyond the gate by what another one expected is wrong, and goes on
+// from that other one's state.
 class MotionBank {
  public:
   // The first of each speak first. Before the world is known pads make no difference, and there is one filter
@@ -57,6 +58,7 @@ class MotionBank {
   std::vector<Member> members_;
   size_t speaker_ = 0;
   double deaf_ = 0;               // s, still
+  double tracked_ = 0;            // s, since the start
   std::array<int, 3> refused_{};  // attitudes, velocities and angular velocities, in a row
 };
 
