@@ -27,11 +27,15 @@ int64_t unix_ns() {
 }
 
 std::string autopilot_name(const mavlink::Autopilot& autopilot) {
-  std::string name = autopilot.is_ardupilot() ? "ArduPilot"
-                     : autopilot.is_px4()
-                         ? "PX4"
-                         : "autopilot of MAV_AUTOPILOT " + std::to_string(autopilot.autopilot);
-  if (autopilot.version) name += " " + version_text(*autopilot.version);
+  std::string name = "autopilot of MAV_AUTOPILOT ";
+  if (autopilot.is_ardupilot()) {
+    name = "ArduPilot";
+  } else if (autopilot.is_px4()) {
+    name = "PX4";
+  } else {
+    name += std::to_string(autopilot.autopilot);
+  }
+  if (autopilot.version) name.append(" ").append(version_text(*autopilot.version));
   return name + ", system " + std::to_string(autopilot.system);
 }
 
@@ -125,8 +129,8 @@ void LiveLink::tell_state(int64_t now_ns) {
 }
 
 void LiveLink::notice_changes() {
-  const auto notice = [&](std::string event) {
-    if (events_.size() < kMostEvents) events_.push_back(std::move(event));
+  const auto notice = [&](const std::string& event) {
+    if (events_.size() < kMostEvents) events_.push_back(event);
   };
   if (link_.state() != told_state_) {
     told_state_ = link_.state();
@@ -210,7 +214,7 @@ std::string LiveLink::autopilot_text() const {
 std::string LiveLink::status() const {
   const std::lock_guard lock(mutex_);
   std::string text = std::string("link ") + name_of(link_.state());
-  if (sends_) text += ", " + std::to_string(output_.sent()) + " sent";
+  if (sends_) text += std::string(", ") + std::to_string(output_.sent()) + " sent";
   return text;
 }
 

@@ -129,7 +129,10 @@ FrameAid frame_of(const AidRow& row, std::vector<AutopilotSample>& said) {
 
 std::string aids_header() {
   std::string header = "#";
-  for (const ColumnName& name : kColumns) header += (header.size() == 1 ? "" : ",") + std::string(name);
+  for (const ColumnName& name : kColumns) {
+    if (header.size() > 1) header += ',';
+    header += name;
+  }
   return header + "\n";
 }
 

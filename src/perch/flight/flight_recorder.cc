@@ -42,7 +42,8 @@ fs::path make_flight_folder(const fs::path& parent) {
   char name[32];
   std::strftime(name, sizeof name, "%Y%m%dT%H%M%SZ", &utc);
   for (int number = 1; number < 1000; ++number) {
-    const fs::path folder = parent / (number == 1 ? name : name + ("-" + std::to_string(number)));
+    const std::string suffix = number == 1 ? "" : '-' + std::to_string(number);
+    const fs::path folder = parent / (name + suffix);
     if (fs::create_directory(folder)) return folder;
   }
   throw std::runtime_error(parent.string() + ": no name is free for a new flight");
