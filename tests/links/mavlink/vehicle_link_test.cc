@@ -94,6 +94,15 @@ TEST(VehicleLink, GetsItsStreamsVersionAndParametersThroughLossAndDeafness) {
   }
 }
 
+TEST(VehicleLink, ParametersThatAreNotThereKeepNoOtherWaiting) {
+  LinkedWorld world;
+  world.autopilot.autopilot = mav_autopilot::kPx4;
+  world.autopilot.parameters = {{"VTE_EN", 1}};  // the 13th of 16 names, of which 8 are asked for at a time
+  // A heartbeat, the first eight in vain, the next: 1 s, 0.7 s, some ms.
+  world.run(2);
+  EXPECT_EQ(world.link.parameters().values(), world.autopilot.parameters);
+}
+
 TEST(VehicleLink, DoesNotPesterAnAutopilotThatHasNoSuchStream) {
   LinkedWorld world;
   world.autopilot.unsupported = {DistanceSensor::kId};

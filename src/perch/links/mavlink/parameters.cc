@@ -77,13 +77,17 @@ std::optional<std::string> ParameterReader::ask(int64_t now_ns) {
   int count = 0;
   for (const auto& [name, wanted] : wanted_) count += under_way(wanted);
   if (count >= kMaxUnderWay) return std::nullopt;
-  for (auto& [name, wanted] : wanted_) {
+  // All once before any again: those that an autopilot does not have keep no other waiting.
+  auto next = wanted_.end();
+  for (auto entry = wanted_.begin(); entry != wanted_.end(); ++entry) {
+    const Wanted& wanted = entry->second;
     if (wanted.known || under_way(wanted) || wanted.tries >= kMaxTries) continue;
-    ++wanted.tries;
-    wanted.asked_ns = now_ns;
-    return name;
+    if (next == wanted_.end() || wanted.tries < next->second.tries) next = entry;
   }
-  return std::nullopt;
+  if (next == wanted_.end()) return std::nullopt;
+  ++next->second.tries;
+  next->second.asked_ns = now_ns;
+  return next->first;
 }
 
 void ParameterReader::receive(const ParamValue& message, uint8_t autopilot) {
