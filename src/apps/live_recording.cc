@@ -4,6 +4,10 @@
 
 namespace perch {
 
+LiveRecording::LiveRecording(Make make) : make_(std::move(make)) {
+  if (make_) start();
+}
+
 std::string LiveRecording::start() {
   if (!make_) return "record: outputs.record names no folder";
   if (recorder()) return "record: it is recording";
@@ -12,10 +16,18 @@ std::string LiveRecording::start() {
     const std::string folder = made->folder().filename().string();
     const std::lock_guard lock(mutex_);
     recorder_ = std::move(made);
+    problem_.clear();
     return "recording " + folder;
   } catch (const std::exception& e) {
-    return std::string("record: ") + e.what();
+    const std::lock_guard lock(mutex_);
+    problem_ = e.what();
+    return "record: there is no recording: " + problem_;
   }
+}
+
+std::string LiveRecording::problem() const {
+  const std::lock_guard lock(mutex_);
+  return problem_;
 }
 
 std::string LiveRecording::stop() {
@@ -32,7 +44,7 @@ std::string LiveRecording::stop() {
 
 nlohmann::json LiveRecording::status() const {
   const auto current = recorder();
-  if (!current) return {{"on", false}, {"possible", static_cast<bool>(make_)}};
+  if (!current) return {{"on", false}, {"possible", static_cast<bool>(make_)}, {"problem", problem()}};
   const auto counters = current->counters();
   return {{"on", true},
           {"possible", true},

@@ -16,10 +16,10 @@ class LiveRecording {
  public:
   using Make = std::function<std::unique_ptr<FlightRecorder>()>;
 
-  // `make` may be empty: there is nowhere to record to. Begins when it is not. Throws what `make` throws.
-  explicit LiveRecording(Make make) : make_(std::move(make)) {
-    if (make_) recorder_ = make_();
-  }
+  // `make` may be empty: there is nowhere to record to. Begins when it is not. A disk that takes nothing,
+  // after a restart in the air perhaps, is no reason not to land: then there is no recording, and problem()
+  // says why.
+  explicit LiveRecording(Make make);
 
   std::shared_ptr<FlightRecorder> recorder() const {
     const std::lock_guard lock(mutex_);
@@ -30,11 +30,14 @@ class LiveRecording {
   std::string start();
   std::string stop();
   nlohmann::json status() const;
+  // Why the last start came to nothing; empty: it did not.
+  std::string problem() const;
 
  private:
   const Make make_;
-  mutable std::mutex mutex_;
+  mutable std::mutex mutex_;  // of what follows
   std::shared_ptr<FlightRecorder> recorder_;
+  std::string problem_;
 };
 
 }  // namespace perch

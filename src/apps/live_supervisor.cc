@@ -262,6 +262,8 @@ int supervise(const fs::path& file, const std::vector<std::string>& overrides,
               const Supervision& supervision) {
   Opened opened = open(file, overrides);
   LiveRecording recording(recorder_maker(opened));
+  if (const std::string problem = recording.problem(); !problem.empty())
+    LOG(ERROR) << "recording: there is none: " << problem;
   const RecordedLog log(recording);
   std::optional<LiveStation> station;
   if (opened.config.station.on) station.emplace(opened.config, opened.source);
@@ -287,7 +289,11 @@ int supervise(const fs::path& file, const std::vector<std::string>& overrides,
   summary["peak_memory_bytes"] = peak_memory_bytes();
   if (watched) summary["station"] = watched->summary();
   const auto recorder = recording.recorder();
-  if (recorder) summary["recording"] = recording_json(*recorder);
+  if (recorder) {
+    summary["recording"] = recording_json(*recorder);
+  } else if (const std::string problem = recording.problem(); !problem.empty()) {
+    summary["recording"]["last_problem"] = problem;
+  }
   const std::string text = summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (!supervision.summary.empty()) write_whole_file(supervision.summary, text);
   if (recorder) write_whole_file(recorder->folder() / "run" / "summary.json", text);

@@ -56,7 +56,7 @@ export class Status {
       this.fact('recording', `${recording.folder}: ${recording.frames} pictures` + (recording.dropped ? `, ${recording.dropped} dropped` : ''), recording.problem ? 'bad' : 'ok');
       this.fact('disk left', gigabytes(recording.disk_left), recording.disk_left < 1e9 ? 'bad' : 'ok');
     } else {
-      this.fact('recording', recording.possible ? 'off' : 'no folder configured');
+      this.fact('recording', recording.problem || (recording.possible ? 'off' : 'no folder configured'), recording.problem ? 'bad' : '');
     }
     this.findings.replaceChildren(...(link?.findings ?? []).map((finding) => element('li', {class: finding.startsWith('error') ? 'bad' : finding.startsWith('warning') ? 'wait' : ''}, finding)));
   }
