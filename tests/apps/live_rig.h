@@ -26,7 +26,10 @@ using testing::HasSubstr;
 inline constexpr char kSimulation[] =
     "camera: {width: 320, height: 240, lens: LENSMODEL_PINHOLE, intrinsics: [226, 226, 159.5, 119.5],"
     " rate_hz: 15}\n"
-    "flight: {start_height: 4, start_aside: 0.5, touchdown_height: 1.5, duration: 14, hover: 10}\n";
+    "flight: {start_height: 4, start_aside: 0.5, touchdown_height: 1.5, duration: 14, hover: 120}\n";
+
+// How long a test waits for what comes within seconds: a machine that others load may take many times that.
+inline constexpr double kPatience = 40;  // s
 
 inline void sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
@@ -51,7 +54,7 @@ class PerchLive : public testing::Test {
 
   // Reads off the log when the flight began, and has the autopilot fly it.
   void fly_with(const ChildProgram& live) {
-    ASSERT_TRUE(live.says(" ns\n", 20)) << live.err();
+    ASSERT_TRUE(live.says(" ns\n", kPatience)) << live.err();
     const std::string log = live.err();
     const int64_t first = std::stoll(log.substr(log.find("first picture, ") + 15));
     begin_ns_ = std::stoll(log.substr(log.find("exposed at ") + 11)) - first * kSecond / 15;
@@ -77,7 +80,7 @@ class PerchLive : public testing::Test {
     return all;
   }
   // Waits until so many have come since.
-  bool landing_targets_come(int64_t since_ns, size_t count, double seconds) const {
+  bool landing_targets_come(int64_t since_ns, size_t count, double seconds = kPatience) const {
     for (double t = 0; t < seconds; t += 0.02, sleep(0.02)) {
       if (landing_targets_since(since_ns).size() >= count) return true;
     }

@@ -26,7 +26,7 @@ class OverTcp : public PerchLive {
 TEST_F(OverTcp, Px4IsToldWhereThePadIsInItsOwnMap) {
   ChildProgram live = start();
   fly_with(live);
-  ASSERT_TRUE(landing_targets_come(0, 20, 12)) << live.err();
+  ASSERT_TRUE(landing_targets_come(0, 20)) << live.err();
   EXPECT_EQ(live.stop(), 0) << live.err();
   for (const auto& [arrived_ns, target] : autopilot_.landing_targets()) {
     EXPECT_EQ(target.frame, mavlink::mav_frame::kLocalNed);
@@ -56,7 +56,7 @@ TEST_F(OverASerialLine, ThatLosesHalvesOfFramesPx4sEstimatorIsToldWithItsUncerta
   autopilot_.cut_every(10);
   ChildProgram live = start();
   fly_with(live);
-  for (int i = 0; i < 600 && autopilot_.relative_targets().size() < 20; ++i) sleep(0.02);
+  for (double t = 0; t < kPatience && autopilot_.relative_targets().size() < 20; t += 0.02) sleep(0.02);
   EXPECT_EQ(live.stop(), 0) << live.err();
   const auto targets = autopilot_.relative_targets();
   ASSERT_GE(targets.size(), 20u) << live.err();
@@ -76,7 +76,7 @@ TEST_F(OverASerialLine, ThatLosesHalvesOfFramesPx4sEstimatorIsToldWithItsUncerta
   EXPECT_TRUE(autopilot_.landing_targets().empty());
   const json mavlink = summary()["mavlink"];
   EXPECT_EQ(mavlink["profile"], "px4-vte");
-  EXPECT_GT(mavlink["heard"]["bad_crc"].get<int>() + mavlink["heard"]["skipped_bytes"].get<int>(), 20);
+  EXPECT_GE(mavlink["heard"]["bad_crc"].get<int>() + mavlink["heard"]["skipped_bytes"].get<int>(), 5);
   EXPECT_EQ(mavlink["heard"]["times_lost"], 0);
 }
 
@@ -104,7 +104,7 @@ class Signed : public PerchLive {
 TEST_F(Signed, WithTheSameKeyAllIsUnderstoodAndNothingGoesUnsigned) {
   ChildProgram live = start_with_key(7);
   fly_with(live);
-  EXPECT_TRUE(landing_targets_come(0, 5, 12)) << live.err();
+  EXPECT_TRUE(landing_targets_come(0, 5)) << live.err();
   EXPECT_EQ(live.stop(), 0) << live.err();
   EXPECT_EQ(autopilot_.unsigned_frames(), 0u);
   EXPECT_EQ(summary()["mavlink"]["heard"]["bad_signature"], 0);
@@ -121,7 +121,7 @@ TEST_F(Signed, WithAnotherKeyOrWithoutOneNobodyIsHeardAndNothingSent) {
   mavlink::Heartbeat heartbeat;
   heartbeat.autopilot = mavlink::mav_autopilot::kArdupilot;
   writer.append(forged, heartbeat);
-  for (int i = 0; i < 25; ++i, sleep(0.1)) autopilot_.send_raw(forged);
+  for (int i = 0; i < 15; ++i, sleep(0.1)) autopilot_.send_raw(forged);
   EXPECT_EQ(live.stop(), 0) << live.err();
   EXPECT_TRUE(autopilot_.landing_targets().empty());
   const json mavlink = summary()["mavlink"];

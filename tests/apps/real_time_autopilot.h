@@ -8,11 +8,14 @@
 #include <poll.h>
 #include <stdlib.h>
 #include <sys/socket.h>
+#include <sys/uio.h>
 #include <termios.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
+#include <cstring>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -32,6 +35,9 @@ class Wire {
   virtual std::string url() const = 0;
   virtual int descriptor() const = 0;  // readable: something may have come
   virtual size_t read(std::span<uint8_t> buffer) = 0;
+  // When that had come, on CLOCK_MONOTONIC: where the kernel says so, a test that sleeps does not make it
+  // late.
+  virtual int64_t arrived_ns() const { return monotonic_ns(); }
   virtual void write(std::span<const uint8_t> bytes) = 0;
   virtual bool datagrams() const { return false; }
 };
@@ -58,16 +64,33 @@ class LoopbackSocket {
 
 class UdpWire : public Wire {
  public:
+  UdpWire() {
+    const int yes = 1;
+    EXPECT_EQ(setsockopt(socket_.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof(yes)), 0);
+  }
   std::string url() const override { return "mavlink+udp://" + socket_.place; }
   int descriptor() const override { return socket_.fd; }
   size_t read(std::span<uint8_t> buffer) override {
     sockaddr_in from{};
-    socklen_t size = sizeof(from);
-    const ssize_t got = recvfrom(socket_.fd, buffer.data(), buffer.size(), MSG_DONTWAIT,
-                                 reinterpret_cast<sockaddr*>(&from), &size);
-    if (got > 0) peer_ = from;
-    return got > 0 ? static_cast<size_t>(got) : 0;
+    iovec place{buffer.data(), buffer.size()};
+    alignas(cmsghdr) std::array<char, 128> control{};
+    msghdr message{};
+    message.msg_name = &from;
+    message.msg_namelen = sizeof(from);
+    message.msg_iov = &place;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    const ssize_t got = recvmsg(socket_.fd, &message, MSG_DONTWAIT);
+    if (got <= 0) return 0;
+    peer_ = from;
+    arrived_ns_ = monotonic_ns();
+    for (cmsghdr* c = CMSG_FIRSTHDR(&message); c; c = CMSG_NXTHDR(&message, c)) {
+      if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_TIMESTAMPNS) arrived_ns_ -= age_ns(CMSG_DATA(c));
+    }
+    return static_cast<size_t>(got);
   }
+  int64_t arrived_ns() const override { return arrived_ns_; }
   void write(std::span<const uint8_t> bytes) override {
     if (peer_.sin_port == 0) return;
     (void)sendto(socket_.fd, bytes.data(), bytes.size(), MSG_DONTWAIT,
@@ -76,8 +99,16 @@ class UdpWire : public Wire {
   bool datagrams() const override { return true; }
 
  private:
+  // How long ago a stamp of the kernel's is, which is one of CLOCK_REALTIME.
+  static int64_t age_ns(const uint8_t* stamp) {
+    timespec then{}, now{};
+    std::memcpy(&then, stamp, sizeof(then));
+    clock_gettime(CLOCK_REALTIME, &now);
+    return (now.tv_sec - then.tv_sec) * kSecond + now.tv_nsec - then.tv_nsec;
+  }
   LoopbackSocket socket_{SOCK_DGRAM};
   sockaddr_in peer_{};  // whoever spoke to us last
+  int64_t arrived_ns_ = 0;
 };
 
 // One client, as SITL serves them.
@@ -223,7 +254,7 @@ class RealTimeAutopilot {
 
   // With the time at which they really came: the fake autopilot hears everything later.
   void note_targets(std::span<const uint8_t> bytes) {
-    const int64_t now_ns = monotonic_ns();
+    const int64_t now_ns = wire_->arrived_ns();
     const auto note = [&](const Frame& frame) {
       if (const auto m = decode<LandingTarget>(frame)) landing_targets_.push_back({now_ns, *m});
       if (const auto m = decode<TargetRelative>(frame)) relative_targets_.push_back({now_ns, *m});

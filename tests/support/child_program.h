@@ -66,7 +66,7 @@ class ChildProgram {
     }
     return -2;
   }
-  int stop(double seconds = 5) {
+  int stop(double seconds = 20) {
     signal(SIGTERM);
     return wait(seconds);
   }
