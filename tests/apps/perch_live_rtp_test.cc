@@ -68,13 +68,13 @@ TEST_F(NetworkCamera, EveryMessageHasTheTimeOfItsExposureAndAVectorWithinItsSigm
   {
     RtpCamera camera(kSize, {port});
     const std::jthread sending = expose([&](int64_t exposed_ns, int64_t i) {
-      const cv::Mat grey = flight_->picture(i);
+      const auto jpeg = RtpCamera::encoded(flight_->picture(i));
       // The first packets come late, as over a radio link: the times of all that follow hang on them.
       sleep_until(exposed_ns + kCameraTakes + (i <= 8 ? 30 * kMs : 0));
-      camera.send(grey, exposed_ns);
+      camera.send(jpeg, exposed_ns);
     });
     autopilot_.with([&](auto& a) { a.motion = [this](int64_t t) { return truth_at(t); }; });
-    ASSERT_TRUE(landing_targets_come(0, 45, 20)) << live.err();
+    ASSERT_TRUE(landing_targets_come(0, 45)) << live.err();
   }
   EXPECT_EQ(live.stop(), 0) << live.err();
   EXPECT_THAT(live.err(), HasSubstr("pictures of the first 2.1 s are left out"));
@@ -145,25 +145,26 @@ TEST_F(NetworkCamera, OnTheBenchTheRightAxesAreGoodAndWrongOnesAreSaid) {
       at += (held - at).cwiseMax(-0.05).cwiseMin(0.05);  // 75 cm/s
     }
     const Rigid3 body_from_pad{Eigen::Quaterniond(0, 1, 0, 0), at};
-    const cv::Mat grey = sensor.picture(renderer.radiance(inverse(body_from_camera()) * body_from_pad), 1,
-                                        static_cast<uint64_t>(i));
+    const auto jpeg = RtpCamera::encoded(sensor.picture(
+        renderer.radiance(inverse(body_from_camera()) * body_from_pad), 1, static_cast<uint64_t>(i)));
     sleep_until(exposed_ns + kCameraTakes);
-    camera.send(grey, exposed_ns);
+    camera.send(jpeg, exposed_ns);
   });
   const char* kDirections[] = {"forward", "to the right", "down"};
   for (int axis = 0; axis < 3; ++axis) {
     const std::string direction = kDirections[axis];
     for (ChildProgram* program : {&right, &wrong})
-      ASSERT_TRUE(program->says("Move it 20 to 30 cm " + direction, 15)) << program->out() << program->err();
+      ASSERT_TRUE(program->says("Move it 20 to 30 cm " + direction, kPatience))
+          << program->out() << program->err();
     {
       const std::lock_guard lock(mutex);
       held(axis) += 0.25;
     }
     for (ChildProgram* program : {&right, &wrong})
-      ASSERT_TRUE(program->says(": moved " + direction, 15)) << program->out();
+      ASSERT_TRUE(program->says(": moved " + direction, kPatience)) << program->out();
   }
-  EXPECT_EQ(right.wait(5), 0);
-  EXPECT_EQ(wrong.wait(5), 1);
+  EXPECT_EQ(right.wait(kPatience), 0);
+  EXPECT_EQ(wrong.wait(kPatience), 1);
   using testing::ContainsRegex;
   for (const char* direction : kDirections) {
     EXPECT_THAT(right.out(), ContainsRegex(std::string("good: moved ") + direction +

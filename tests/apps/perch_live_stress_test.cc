@@ -21,8 +21,8 @@ class Stressed : public PerchLive {
     });
   }
   // Waits until so many have come since.
-  bool relative_targets_come(int64_t since_ns, int count, double seconds) const {
-    for (double t = 0; t < seconds; t += 0.02, sleep(0.02)) {
+  bool relative_targets_come(int64_t since_ns, int count) const {
+    for (double t = 0; t < kPatience; t += 0.02, sleep(0.02)) {
       int come = 0;
       for (const auto& target : autopilot_.relative_targets()) come += target.arrived_ns >= since_ns;
       if (come >= count) return true;
@@ -56,20 +56,20 @@ class Hogs {
 TEST_F(Stressed, StoppedAndStarvedItSaysNothingStaleAndNothingWrong) {
   ChildProgram live = start();
   fly_with(live);
-  ASSERT_TRUE(relative_targets_come(0, 5, 12)) << live.err();
+  ASSERT_TRUE(relative_targets_come(0, 5)) << live.err();
   // Not a turn for longer than a measurement may be old: what was on its way then must not go out afterwards.
   for (int i = 0; i < 2; ++i) {
     live.signal(SIGSTOP);
     sleep(0.8);
     live.signal(SIGCONT);
-    EXPECT_TRUE(relative_targets_come(monotonic_ns(), 5, 5)) << live.err();
+    EXPECT_TRUE(relative_targets_come(monotonic_ns(), 5)) << live.err();
   }
   const int64_t starved_ns = monotonic_ns();
   {
     const Hogs hogs(4 * std::thread::hardware_concurrency());
     sleep(1);
   }
-  EXPECT_TRUE(relative_targets_come(monotonic_ns(), 5, 5)) << live.err();
+  EXPECT_TRUE(relative_targets_come(monotonic_ns(), 5)) << live.err();
   EXPECT_EQ(live.stop(), 0) << live.err();
 
   for (const auto& [arrived_ns, target] : autopilot_.relative_targets()) {
@@ -95,8 +95,8 @@ TEST_F(PerchLive, OnAFullDiskTheRecordingSuffersAndNothingElse) {
                               "'outputs.record={folder: flights, format: ffv1}'";
   ChildProgram live(folder_, "/bin/sh", {"-c", command});
   fly_with(live);
-  EXPECT_TRUE(live.says("File too large", 15)) << live.err();
-  EXPECT_TRUE(landing_targets_come(monotonic_ns(), 15, 5)) << live.err();
+  EXPECT_TRUE(live.says("File too large", kPatience)) << live.err();
+  EXPECT_TRUE(landing_targets_come(monotonic_ns(), 15)) << live.err();
   EXPECT_EQ(live.stop(), 0) << live.err();
   const json recording = summary()["recording"];
   EXPECT_GE(recording["frames_dropped"], 10);
