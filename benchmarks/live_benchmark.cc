@@ -3,7 +3,8 @@
 // recording, on an idle machine and beside a program that keeps every core busy. See benchmarks/README.md.
 //
 //   perch_live_benchmark SECONDS [row]
-//   perch_live_benchmark SECONDS compare FILE   one turn each without and with recording, added to FILE's;
+//   perch_live_benchmark SECONDS compare FILE   one turn each without and with recording, on a disk of which
+//                                               each write takes 20 ms, added to the latencies in FILE;
 //                                               the 99 % of all turns there against each other
 //   perch_live_benchmark SECONDS memory         a simulation that is recorded: what is resident each minute
 
@@ -20,11 +21,13 @@
 #include "paired_latency.h"
 #include "perch/flight/sensor_file.h"
 #include "perch/simulation/simulation.h"
+#include "station/raw_client.h"
 #include "support/temp_folder.h"
 
 namespace perch {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::json;
 constexpr int kRate = 30;
 constexpr int kPictures = 60;  // rendered; played to and fro
@@ -34,6 +37,7 @@ struct Row {
   bool busy = false;   // every core has another program on it
   std::string record;  // "", png, ffv1
   bool slow_disk = false;
+  bool page = false;  // the station runs, and somebody looks at it
 };
 
 Simulation simulation() {
@@ -60,6 +64,41 @@ void write_film(const SimulatedFlight& flight, const std::string& file, int seco
   }
 }
 
+// Somebody who looks at the station's page: takes the states and pictures that come and says so, as a browser
+// does, from when the log says where the station is.
+class Page {
+ public:
+  explicit Page(const std::string& log)
+      : log_(log), thread_([this](const std::stop_token& stop) { watch(stop); }) {}
+
+ private:
+  void watch(const std::stop_token& stop) {
+    const std::string says = "station: port ";
+    size_t at = std::string::npos;
+    std::string log;
+    while (!stop.stop_requested() && at == std::string::npos) {
+      usleep(20'000);
+      log = std::ifstream(log_).good() ? read_file(log_) : "";
+      at = log.rfind(says);
+      if (at != std::string::npos && log.find('\n', at) == std::string::npos) at = std::string::npos;
+    }
+    if (stop.stop_requested()) return;
+    const int port = std::stoi(log.substr(at + says.size()));
+    const std::string host = "127.0.0.1:" + std::to_string(port);
+    RawClient client(static_cast<uint16_t>(port));
+    if (!client.upgrade(host, "http://" + host)) return;
+    client.say(R"({"from":{"session":"","sequence":0}})");
+    for (int messages = 0; !stop.stop_requested();) {
+      const auto message = client.next(0.1);
+      if (message.opcode == 8) return;
+      if (message.opcode > 0) client.say("{\"ack\":" + std::to_string(++messages) + "}");
+    }
+  }
+
+  const std::string log_;
+  std::jthread thread_;
+};
+
 pid_t start(const std::string& folder, std::vector<std::string> arguments, const std::string& preload) {
   const pid_t child = fork();
   if (child != 0) return child;
@@ -67,7 +106,7 @@ pid_t start(const std::string& folder, std::vector<std::string> arguments, const
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  if (chdir(folder.c_str()) != 0 || !freopen("log", "a", stderr)) _exit(126);
+  if (chdir(folder.c_str()) != 0 || !freopen("log", "w", stderr)) _exit(126);
   execv(argv[0], argv.data());
   _exit(127);
 }
@@ -101,8 +140,13 @@ json run(const Row& row, const TempFolder& folder, int seconds, std::vector<doub
     arguments.insert(arguments.end(), {"--set", "outputs.record.folder=flights", "--set",
                                        "outputs.record.format=" + row.record});
   }
+  if (row.page) arguments.insert(arguments.end(), {"--set", "outputs.station.listen=127.0.0.1:0"});
+  fs::remove(folder / "log");
+  std::optional<Page> page;
+  if (row.page) page.emplace(folder / "log");
   const auto busy = row.busy ? keep_cores_busy() : std::vector<pid_t>{};
   waitpid(start(folder.path().string(), arguments, row.slow_disk ? PERCH_SLOW_DISK : ""), nullptr, 0);
+  page.reset();
   for (const pid_t child : busy) kill(child, SIGKILL), waitpid(child, nullptr, 0);
   json summary = json::parse(read_file(folder / "summary.json"));
   summary["landing_targets"] = autopilot.landing_targets().size();
@@ -119,7 +163,7 @@ void compare(const TempFolder& folder, int seconds, const std::string& file) {
   const long turn = time(nullptr);
   for (const char* record : {"", "png", "ffv1"}) {
     std::vector<double> ms;
-    run({"", false, record, false}, folder, seconds, &ms);
+    run({"", false, record, *record != 0}, folder, seconds, &ms);
     paired.add(turn, *record ? std::string("recording ") + record : "not recording", ms);
   }
   paired.print("not recording");
@@ -174,9 +218,10 @@ void print(const Row& row, const json& summary) {
   const auto percent = [&](const char* thread) {
     return 100 * summary["cpu_s"][thread].get<double>() / seconds;
   };
-  std::printf("| %s | %s | %s | %s | %.1f | %.1f | %.1f | %.1f | %lld of %lld | %lld |\n", row.name.c_str(),
-              latency("waiting").c_str(), latency("estimate").c_str(), latency("total").c_str(),
-              percent("process"), percent("capture"), percent("estimator"), percent("link"),
+  std::printf("| %s | %s | %s | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %lld of %lld | %lld |\n",
+              row.name.c_str(), latency("waiting").c_str(), latency("estimate").c_str(),
+              latency("total").c_str(), percent("process"), percent("capture"), percent("estimator"),
+              percent("link"), row.page ? 100 * summary["station"]["cpu_s"].get<double>() / seconds : 0,
               static_cast<long long>(summary["landing_targets"]), static_cast<long long>(summary["frames"]),
               row.record.empty() ? 0LL : static_cast<long long>(summary["recording"]["frames_dropped"]));
   std::fflush(stdout);
@@ -206,12 +251,12 @@ int benchmark(int seconds, const std::string& only, const std::string& file) {
   }
   std::puts(
       "| | waiting, ms | estimate, ms | exposure to sent, ms | CPU % of a core | capture | estimator | link "
-      "| "
-      "sent of frames | pictures not recorded |\n|---|---|---|---|---|---|---|---|---|---|");
+      "| station | sent of frames | pictures not recorded |\n|---|---|---|---|---|---|---|---|---|---|---|");
   for (const Row& row :
-       {Row{"idle", false, "", false}, Row{"recording png", false, "png", false},
-        Row{"recording ffv1", false, "ffv1", false}, Row{"recording png, slow disk", false, "png", true},
-        Row{"all cores busy", true, "", false}, Row{"all cores busy, recording png", true, "png", false}}) {
+       {Row{"idle", false, "", false}, Row{"a page that watches", false, "", false, true},
+        Row{"recording png", false, "png", false}, Row{"recording ffv1", false, "ffv1", false},
+        Row{"recording png, slow disk", false, "png", true}, Row{"all cores busy", true, "", false},
+        Row{"all cores busy, recording png", true, "png", false}}) {
     if (only.empty() || row.name == only) print(row, run(row, folder, seconds));
   }
   return 0;
