@@ -1,11 +1,13 @@
 #include "batch_compare.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "perch/analysis/compared_flight.h"
 #include "perch/geometry/euler.h"
 
 namespace perch {
@@ -74,21 +76,62 @@ std::string line_of(const Quantity& quantity, const json& ours, const json& thei
   return row(quantity.name, text(now), text(was), quantity.unit);
 }
 
+std::string table_of(const std::string& name, const json& ours, const json& theirs) {
+  std::string lines = "  " + name + ":\n" + row("", "B", "A", "");
+  for (const Quantity& quantity : kQuantities) lines += line_of(quantity, ours, theirs);
+  return lines;
+}
+
+// Fewer flights than this say little of others; then it is their seconds that are drawn.
+constexpr size_t kFewFlights = 10;
+constexpr size_t kMostTables = 20;
+
+ComparedFrames sum_of(const std::vector<ComparedFrames>& samples) {
+  ComparedFrames sum;
+  for (const ComparedFrames& sample : samples) sum += sample;
+  return sum;
+}
+
 }  // namespace
 
-std::string compare_runs(const fs::path& output, const fs::path& other, std::span<const fs::path> folders) {
-  std::string lines = "against " + other.string() + ":\n";
-  for (const auto& folder : folders) {
-    const fs::path name = folder.lexically_relative(output);
-    const auto ours = read_summary(folder), theirs = read_summary(other / name);
+RunComparison compare_runs(const fs::path& a, const fs::path& b, std::span<const std::string> flights) {
+  std::vector<std::vector<ComparedFrames>> compared;
+  std::string tables, missing;
+  for (const std::string& name : flights) {
+    const auto ours = read_summary(b / name), theirs = read_summary(a / name);
     if (!ours || !theirs) {
-      lines += "  " + name.string() + ": not in " + (ours ? "that run" : "this run") + "\n";
+      missing += "  " + name + ": not in " + (ours ? "A" : "B") + "\n";
       continue;
     }
-    lines += "  " + name.string() + ":\n" + row("", "now", "was", "");
-    for (const Quantity& quantity : kQuantities) lines += line_of(quantity, *ours, *theirs);
+    compared.push_back(compare_flight(a / name, b / name));
+    if (flights.size() <= kMostTables) tables += table_of(name, *ours, *theirs);
   }
-  return lines;
+  std::vector<ComparedFrames> samples;
+  const bool few = compared.size() < kFewFlights;
+  for (const auto& flight : compared) {
+    if (!few) samples.push_back(sum_of(flight));
+    if (few) samples.insert(samples.end(), flight.begin(), flight.end());
+  }
+  RunComparison comparison;
+  comparison.text = "A: " + a.string() + ", B: " + b.string() + ", " + std::to_string(compared.size()) +
+                    " flights, " + std::to_string(sum_of(samples).frames) + " frames; 95 % intervals by " +
+                    (few ? "seconds, of these flights alone:\n" : "flights:\n");
+  for (const Change& change : changes_of(samples)) {
+    const bool worse = change.counts && change.verdict == Verdict::kWorse;
+    comparison.text += "  " + change.sentence + (worse ? ": worse\n" : "\n");
+    comparison.worse = comparison.worse || worse;
+  }
+  comparison.text += missing + tables;
+  return comparison;
+}
+
+std::vector<std::string> flights_of_run(const fs::path& run) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(run)) {
+    if (fs::exists(entry.path() / "summary.json")) names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
 }
 
 }  // namespace perch

@@ -3,12 +3,21 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace perch {
 
-// What changed between two runs, from their summary.json files, as lines for a terminal: rate, errors, honesty
-// and times of each flight that both have. `folders` are those of this run, `output`/FLIGHTNAME.
-std::string compare_runs(const std::filesystem::path& output, const std::filesystem::path& other,
-                         std::span<const std::filesystem::path> folders);
+struct RunComparison {
+  std::string text;    // for a terminal
+  bool worse = false;  // something is, beyond chance and tolerance
+};
+
+// What changed from run A to run B, of the flights that both have: a verdict a line, with intervals, over
+// all; and the numbers of each flight where they are few.
+RunComparison compare_runs(const std::filesystem::path& a, const std::filesystem::path& b,
+                           std::span<const std::string> flights);
+
+// The names of the flights that a run's folder has results of.
+std::vector<std::string> flights_of_run(const std::filesystem::path& run);
 
 }  // namespace perch

@@ -1,11 +1,14 @@
 #include "batch_flight.h"
 
 #include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <fstream>
 #include <memory>
 
 #include "flight_aids.h"
+#include "perch/analysis/error_table.h"
 #include "perch/analysis/output_files.h"
 #include "perch/analysis/overlay.h"
 #include "perch/analysis/pad_json.h"
@@ -18,8 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Pictures that are decoded ahead of the estimator: enough that it never waits, and bounded memory.
-constexpr size_t kFramesAhead = 16;
+// Pictures that are decoded ahead of the estimator, a thread: enough that it never waits, and bounded memory.
+constexpr size_t kFramesAhead = 4;
 
 CameraModel camera_of(const RunConfig& config, const Flight& flight) {
   if (!config.camera_model.empty()) return read_camera_model(config.camera_model);
@@ -39,41 +42,91 @@ FrameChain chain_of(const RunConfig& config, const Flight& flight) {
   return chain;
 }
 
-// Decodes in parallel and estimates in order: a frame's result may depend on those before it.
-void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator,
+// The tables that grow by a row a frame, so that a long flight's need not be kept.
+class FrameTables {
+ public:
+  explicit FrameTables(const fs::path& folder)
+      : estimates_(folder / "estimates.csv"),
+        states_(folder / "states.csv"),
+        poses_(folder / "pad_from_body.tum") {
+    estimates_.text = estimates_header();
+    states_.text = states_header();
+  }
+  void add(const Estimate& estimate) {
+    append_estimate(estimate, estimates_.text);
+    if (estimate.state) append_state(*estimate.state, states_.text);
+    if (estimate.pad_from_body) append_tum(estimate.timestamp_ns, estimate.pad_from_body->mean, poses_.text);
+    for (Table* table : {&estimates_, &states_, &poses_}) {
+      if (table->text.size() > kChunk) table->flush();
+    }
+  }
+  void close() {
+    for (Table* table : {&estimates_, &states_, &poses_}) table->close();
+  }
+
+ private:
+  static constexpr size_t kChunk = 1 << 16;  // bytes
+  struct Table {
+    explicit Table(fs::path path) : file(std::move(path)), stream(file, std::ios::binary) {}
+    void flush() {
+      stream << text;
+      text.clear();
+    }
+    void close() {
+      flush();
+      stream.close();
+      if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+    }
+    fs::path file;
+    std::ofstream stream;
+    std::string text;
+  };
+  Table estimates_, states_, poses_;
+};
+
+void forget_times(Estimate& estimate) {
+  estimate.detect_us = estimate.pose_us = estimate.total_us = 0;
+  estimate.stages.clear();
+}
+
+// Decodes in parallel and estimates in order: a frame's result depends on those before it, by the filter and
+// by what its picture deforms, to the last bit; so nothing but the order gives what one pass gives. Decoding
+// a picture takes some twenty times as long as estimating it.
+void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator, FrameTables& tables,
                      FlightResult& result) {
   using FramePtr = std::shared_ptr<Frame>;
   FlightAids aids(result.flight, result.chain, job.config);
-  tbb::parallel_pipeline(
-      kFramesAhead,
-      tbb::make_filter<void, FramePtr>(tbb::filter_mode::serial_in_order,
-                                       [&](tbb::flow_control& flow) -> FramePtr {
-                                         auto frame = std::make_shared<Frame>();
-                                         if (!job.stop && source.advance(*frame)) return frame;
-                                         flow.stop();
-                                         return nullptr;
-                                       }) &
-          tbb::make_filter<FramePtr, FramePtr>(tbb::filter_mode::parallel,
-                                               [&](FramePtr frame) {
-                                                 source.read(*frame);
-                                                 return frame;
-                                               }) &
-          tbb::make_filter<FramePtr, void>(tbb::filter_mode::serial_in_order, [&](const FramePtr& frame) {
-            result.estimates.push_back(estimator.process(*frame, aids.at(frame->timestamp_ns)));
-            result.frame_names.push_back(frame->name);
-            job.frame_done();
-          }));
+  const auto estimate_frame = [&](const FramePtr& frame) {
+    Estimate estimate = estimator.process(*frame, aids.at(frame->timestamp_ns));
+    if (!job.times) forget_times(estimate);
+    tables.add(estimate);
+    estimate.residuals = {};  // most of an estimate, and nobody asks for them any more
+    result.estimates.push_back(std::move(estimate));
+    result.frame_names.push_back(frame->name);
+    job.frame_done();
+  };
+  const auto threads = static_cast<size_t>(tbb::this_task_arena::max_concurrency());
+  // A thread that waits takes frames of this flight only: one that began another flight meanwhile would keep
+  // this one waiting, and more and more flights' pictures in memory.
+  tbb::this_task_arena::isolate([&] {
+    tbb::parallel_pipeline(
+        kFramesAhead * threads,
+        tbb::make_filter<void, FramePtr>(tbb::filter_mode::serial_in_order,
+                                         [&](tbb::flow_control& flow) -> FramePtr {
+                                           auto frame = std::make_shared<Frame>();
+                                           if (!job.stop && source.advance(*frame)) return frame;
+                                           flow.stop();
+                                           return nullptr;
+                                         }) &
+            tbb::make_filter<FramePtr, FramePtr>(tbb::filter_mode::parallel,
+                                                 [&](FramePtr frame) {
+                                                   source.read(*frame);
+                                                   return frame;
+                                                 }) &
+            tbb::make_filter<FramePtr, void>(tbb::filter_mode::serial_in_order, estimate_frame));
+  });
   if (job.stop) throw Interrupted();
   result.problems = aids.problems();
-}
-
-void write_outputs(const fs::path& folder, const FlightResult& result, const FlightScore& score) {
-  fs::create_directories(folder);
-  write_estimates(folder / "estimates.csv", result.estimates);
-  write_states(folder / "states.csv", result.estimates);
-  write_pad_from_body(folder / "pad_from_body.tum", result.estimates);
-  // Last: who finds a summary finds the rest.
-  write_flight_files(folder, score);
 }
 
 // Reads the pictures that the report shows once more: keeping all until they are chosen would take the memory
@@ -83,8 +136,10 @@ std::vector<ReportPicture> draw_pictures(const BatchFlight& job, const FlightRes
   std::vector<ReportPicture> pictures;
   for (const ShownFrame& shown : frames_to_show(score)) pictures.push_back({shown, {}});
   const auto source = open_image_source("flight:" + job.folder.string(), job.config.channel);
+  size_t end = 0;  // after the last of them: going on would decode the rest of a video for nothing
+  for (const auto& picture : pictures) end = std::max(end, picture.shown.frame + 1);
   Frame frame;
-  for (size_t i = 0; i < result.estimates.size() && source->advance(frame); ++i) {
+  for (size_t i = 0; i < end && source->advance(frame); ++i) {
     for (auto& picture : pictures) {
       if (picture.shown.frame != i) continue;
       source->read(frame);
@@ -99,7 +154,7 @@ std::vector<ReportPicture> draw_pictures(const BatchFlight& job, const FlightRes
 
 }  // namespace
 
-ReportFlight run_flight(const BatchFlight& job) {
+std::string run_flight(const BatchFlight& job) {
   FlightResult result;
   result.flight = read_flight(job.folder);
   result.chain = chain_of(job.config, result.flight);
@@ -109,14 +164,16 @@ ReportFlight run_flight(const BatchFlight& job) {
   config.frames = result.chain;
   Estimator estimator(config, camera);
   const auto source = open_image_source("flight:" + job.folder.string(), job.config.channel);
-  estimate_frames(job, *source, estimator, result);
+  FrameTables tables(job.output);
+  estimate_frames(job, *source, estimator, tables, result);
+  tables.close();
   result.problems.insert(result.problems.end(), source->problems().begin(), source->problems().end());
 
   ReportFlight report{
       score_flight(result), {}, pad_json(job.config.target, inverse(result.chain.target_from_pad))};
-  write_outputs(job.output, result, report.score);
   report.pictures = draw_pictures(job, result, report.score, camera);
-  return report;
+  write_flight_files(job.output, report, job.resolved);
+  return error_table(report.score);
 }
 
 }  // namespace perch

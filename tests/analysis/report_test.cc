@@ -4,6 +4,8 @@
 #include <regex>
 
 #include "analysis/flights.h"
+#include "perch/analysis/season.h"
+#include "perch/analysis/summary.h"
 #include "support/near_pose.h"
 
 namespace perch {
@@ -63,6 +65,25 @@ TEST(Report, HoldsItsFlightsAsJson) {
   EXPECT_NEAR(frames["error_cm_deg"][3][5].get<double>(),
               flights[0].score.frames[5].error->difference[3] * kDegFromRad, 0.5e-4);
   EXPECT_EQ(data[1]["summary"]["frames"], 0);
+}
+
+TEST(Report, AFlightsDataComesOutOfItsPageAsItWentIn) {
+  TestRng rng;
+  FlightResult result = make_flight({.frames = 3}, rng);
+  result.flight.name = "</script>\n<b>";
+  const std::vector<ReportFlight> flights = {report_flight(result)};
+  EXPECT_EQ(flight_data_of_page(report_html(flights, "</script>")), flight_data(flights[0]));
+  EXPECT_EQ(flight_data_of_page(""), "");
+  EXPECT_EQ(flight_data_of_page("<script class=\"flight\" type=\"application/json\">{"), "");
+}
+
+TEST(Report, ASeasonOfThousandsIsSmall) {
+  TestRng rng;
+  const auto summary = summary_json(score_flight(make_flight({.frames = 30, .noise = 0.01}, rng)));
+  Season season;
+  for (int i = 0; i < 5000; ++i) season.add(summary);
+  // Each flight some 20 columns of 8 characters.
+  EXPECT_LE(season_html(season.json(), {}, "").size(), 700'000u + 5000 * 20 * 8);
 }
 
 TEST(Report, AsksTheNetworkForNothing) {

@@ -74,16 +74,18 @@ TEST(Summary, CsvHasAsManyFieldsAsItsHeader) {
   for (const FlightResult& flight : odd_flights()) {
     FlightScore score = score_flight(flight);
     score.name = "plain";
-    const std::string row = summary_csv_row(score);
+    const std::string row = summary_csv_row(summary_json(score));
     EXPECT_EQ(columns(row), columns(summary_csv_header())) << row;
     EXPECT_EQ(row.back(), '\n');
     EXPECT_THAT(row, Not(HasSubstr("nan")));
     EXPECT_THAT(row, Not(HasSubstr("inf")));
+    // From the file it is the same row.
+    EXPECT_EQ(summary_csv_row(nlohmann::ordered_json::parse(to_text(summary_json(score), 2))), row);
   }
 }
 
 TEST(Summary, CsvCountsAFlightThatFailed) {
-  const std::string row = summary_csv_row(failed_flight("a", "a: no flight"));
+  const std::string row = summary_csv_row(summary_json(failed_flight("a", "a: no flight")));
   EXPECT_EQ(row.rfind("a,not estimated,0,0,", 0), 0u) << row;
   EXPECT_EQ(columns(row), columns(summary_csv_header()));
   EXPECT_TRUE(row.ends_with(",1\n")) << row;
@@ -92,7 +94,7 @@ TEST(Summary, CsvCountsAFlightThatFailed) {
 TEST(Summary, CsvQuotesANameWithAComma) {
   FlightScore score;
   score.name = "a,\"b\"";
-  EXPECT_EQ(summary_csv_row(score).rfind("\"a,\"\"b\"\"\",", 0), 0u);
+  EXPECT_EQ(summary_csv_row(summary_json(score)).rfind("\"a,\"\"b\"\"\",", 0), 0u);
 }
 
 TEST(Summary, ErrorsAreARowForEachComparedFrame) {

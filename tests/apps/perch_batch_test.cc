@@ -64,8 +64,9 @@ TEST_F(PerchBatch, ScoresAFlightAndWritesAllItsFiles) {
   EXPECT_THAT(result.out,
               HasSubstr("good: 12 of 12 frames with a pose (100.0 %), 12 compared with navigation"));
   EXPECT_THAT(result.out, HasSubstr("report: out/report.html\n"));
-  for (const char* file : {"good/estimates.csv", "good/states.csv", "good/pad_from_body.tum",
-                           "good/errors.csv", "good/summary.json", "summary.csv", "report.html"}) {
+  for (const char* file :
+       {"good/estimates.csv", "good/states.csv", "good/pad_from_body.tum", "good/errors.csv",
+        "good/summary.json", "good/report.html", "summary.csv", "report.html", "results.sqlite"}) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / file)) << file;
   }
   // The simulator's truth: a hundredth of the distance is what 320 x 240 gives at the very worst.
@@ -139,12 +140,18 @@ TEST_F(PerchBatch, ComparesWithAnEarlierRun) {
   ASSERT_EQ(run("--config good/perch.yaml --set detection.method=paper --output before good").code, 0);
   const Outcome result = run("--config good/perch.yaml --output out --compare before good");
   EXPECT_EQ(result.code, 0) << result.err;
-  const std::string changes = result.out.substr(result.out.find("against before:\n"));
-  for (const char* line : {"  good:\n", "    with a pose ", "    yaw RMS ", "    position RMS, truth ",
-                           "    mean NEES ", "    median time a frame "}) {
+  const std::string changes = result.out.substr(result.out.find("A: before, B: out, 1 flights, 12 frames"));
+  for (const char* line : {"  B finds ", "  position RMS ", "  attitude RMS ",
+                           "  time a frame ", "  good:\n", "    with a pose ", "    yaw RMS ",
+                           "    position RMS, truth ", "    mean NEES ", "    median time a frame "}) {
     EXPECT_THAT(changes, HasSubstr(line));
   }
   EXPECT_THAT(changes, Not(HasSubstr("nan")));
+  // The same of two runs that are there; the other way round the better method has become the worse one.
+  const Outcome back = run("--compare out before");
+  EXPECT_EQ(back.code, 3) << back.out << back.err;
+  EXPECT_THAT(back.out, HasSubstr(" higher ["));
+  EXPECT_THAT(back.out, HasSubstr("]: worse\n"));
 }
 
 TEST_F(PerchBatch, AnInterruptLeavesWholeFilesOnly) {
@@ -184,9 +191,10 @@ TEST_F(PerchBatch, AnInterruptLeavesWholeFilesOnly) {
   size_t done = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "out")) {
     if (entry.is_directory()) continue;
-    EXPECT_THAT(entry.path().filename().string(),
-                testing::AnyOf("estimates.csv", "states.csv", "pad_from_body.tum", "errors.csv",
-                               "summary.json", "summary.csv", "report.html"));
+    EXPECT_THAT(
+        entry.path().filename().string(),
+        testing::AnyOf("estimates.csv", "states.csv", "pad_from_body.tum", "errors.csv", "summary.json",
+                       "complete.json", "summary.csv", "report.html", "results.sqlite", ".lock"));
     if (entry.path().filename() != "estimates.csv") continue;
     ++done;
     const std::string text = read_file(entry.path());

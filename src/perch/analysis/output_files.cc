@@ -1,20 +1,35 @@
 #include "perch/analysis/output_files.h"
 
+#include <cerrno>
+#include <fstream>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+
 #include "perch/analysis/summary.h"
-#include "perch/config/atomic_file.h"
 
 namespace perch {
-void write_flight_files(const std::filesystem::path& flight_folder, const FlightScore& score) {
-  write_whole_file(flight_folder / "errors.csv", errors_csv(score));
-  write_whole_file(flight_folder / "summary.json", to_text(summary_json(score), 2) + "\n");
+namespace {
+
+// Not to the disk at once, as an AtomicFile is: that takes longer than a short flight.
+void write(const std::filesystem::path& file, std::string_view text) {
+  errno = 0;
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) {
+    throw std::runtime_error(file.string() + ": cannot be written: " +
+                             (errno ? std::generic_category().message(errno) : "an earlier error"));
+  }
 }
 
-void write_run_files(const std::filesystem::path& folder, std::span<const ReportFlight> flights,
-                     const std::string& configuration) {
-  std::string summary = summary_csv_header();
-  for (const ReportFlight& flight : flights) summary += summary_csv_row(flight.score);
-  write_whole_file(folder / "summary.csv", summary);
-  write_whole_file(folder / "report.html", report_html(flights, configuration));
+}  // namespace
+
+void write_flight_files(const std::filesystem::path& folder, const ReportFlight& flight,
+                        const std::string& configuration) {
+  write(folder / "errors.csv", errors_csv(flight.score));
+  write(folder / "summary.json", to_text(summary_json(flight.score), 2) + "\n");
+  write(folder / "report.html", report_html({&flight, 1}, configuration));
 }
 
 }  // namespace perch

@@ -157,9 +157,11 @@ constexpr std::string_view kHead = R"(<!DOCTYPE html>
 <link rel="icon" href="data:,">
 )";
 
-}  // namespace
+constexpr std::string_view kFlightBegin = "<script class=\"flight\" type=\"application/json\">",
+                           kScriptEnd = "</script>\n";
 
-std::string report_html(std::span<const ReportFlight> flights, const std::string& configuration) {
+std::string page_html(const Json& season, std::span<const std::string> flights,
+                      const std::string& configuration) {
   std::string html(kHead);
   const auto add = [&html](std::initializer_list<std::string_view> parts) {
     for (const std::string_view part : parts) html += part;
@@ -168,18 +170,40 @@ std::string report_html(std::span<const ReportFlight> flights, const std::string
   add(
       {"<noscript>This report draws its plots with JavaScript; the same numbers are in "
        "summary.json.</noscript>\n"});
-  add({"<script id=\"configuration\" type=\"application/json\">", for_script(configuration), "</script>\n"});
+  add({"<script id=\"configuration\" type=\"application/json\">", for_script(configuration), kScriptEnd});
+  add({"<script id=\"season\" type=\"application/json\">", for_script(season), kScriptEnd});
   // A script tag a flight: one flight's JSON tree at a time is in memory, here and in the browser.
-  for (const ReportFlight& flight : flights) {
-    const Json data = {{"summary", summary_json(flight.score)},
-                       {"frames", frames_json(flight.score)},
-                       {"pictures", pictures_json(flight)},
-                       {"pad", flight.pad}};
-    add({"<script class=\"flight\" type=\"application/json\">", for_script(data), "</script>\n"});
-  }
-  add({"<script>\n", kReportJs, "</script>\n"});
+  for (const std::string& flight : flights) add({kFlightBegin, flight, kScriptEnd});
+  add({"<script>\n", kReportJs, kScriptEnd});
   add({"</body>\n</html>\n"});
   return html;
+}
+
+}  // namespace
+
+std::string flight_data(const ReportFlight& flight) {
+  return for_script({{"summary", summary_json(flight.score)},
+                     {"frames", frames_json(flight.score)},
+                     {"pictures", pictures_json(flight)},
+                     {"pad", flight.pad}});
+}
+
+std::string flight_data_of_page(const std::string& html) {
+  const size_t tag = html.find(kFlightBegin);
+  if (tag == std::string::npos) return {};
+  const size_t begin = tag + kFlightBegin.size(), end = html.find(kScriptEnd, begin);
+  return end == std::string::npos ? std::string() : html.substr(begin, end - begin);
+}
+
+std::string report_html(std::span<const ReportFlight> flights, const std::string& configuration) {
+  std::vector<std::string> data;
+  for (const ReportFlight& flight : flights) data.push_back(flight_data(flight));
+  return page_html(nullptr, data, configuration);
+}
+
+std::string season_html(const Json& season, std::span<const std::string> flights,
+                        const std::string& configuration) {
+  return page_html(season, flights, configuration);
 }
 
 }  // namespace perch

@@ -21,9 +21,19 @@ struct ReportFlight {
   nlohmann::json pad = nullptr;  // what the 3-D view draws, from pad_json; or null
 };
 
-// The page: one self-contained HTML file that asks the network for nothing. `configuration` is shown as it
-// is, the text of Section::resolved(). No name, problem or configuration can break out of its place in the
-// page.
+// The page of some flights: one self-contained HTML file that asks the network for nothing. `configuration`
+// is shown as it is, the text of Section::resolved(). No name, problem or configuration can break out of its
+// place in the page.
 std::string report_html(std::span<const ReportFlight> flights, const std::string& configuration);
+
+// What a page holds of a flight, JSON that is safe within <script>; and the same cut out of a flight's page.
+// Empty when it is none.
+std::string flight_data(const ReportFlight& flight);
+std::string flight_data_of_page(const std::string& html);
+
+// The page of a run: `season` of all its flights (season.h), and either the data of each in its order, or
+// none; then the page links FLIGHTNAME/report.html.
+std::string season_html(const nlohmann::ordered_json& season, std::span<const std::string> flights,
+                        const std::string& configuration);
 
 }  // namespace perch

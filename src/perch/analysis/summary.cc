@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <sstream>
 
 namespace perch {
 namespace {
@@ -131,6 +130,7 @@ nlohmann::ordered_json summary_json(const FlightScore& score) {
   return {{"flight", score.name},
           {"target", score.target},
           {"frames", score.frames.size()},
+          {"start_ns", score.frames.empty() ? Json(nullptr) : Json(score.frames.front().timestamp_ns)},
           {"duration_s", number(duration)},
           {"detection", detection_json(score.detections)},
           {"comparison", to_string(score.comparison)},
@@ -145,38 +145,64 @@ nlohmann::ordered_json summary_json(const FlightScore& score) {
           {"problems", score.problems}};
 }
 
-std::string summary_csv_header() {
-  std::string csv = "flight,comparison,frames,ok,detection_rate [],compared_frames";
-  for (const char* kind : {"rms", "dc_offset", "rms_without_dc_offset"}) {
-    for (size_t i = 0; i < 6; ++i) {
-      csv += ',';
-      csv += kStateNames[i];
-      csv += '_';
-      csv += kind;
-      csv += is_angle(i) ? " [rad]" : " [m]";
+const std::vector<SummaryColumn>& summary_columns() {
+  using At = Json::json_pointer;
+  static const std::vector<SummaryColumn> columns = [] {
+    std::vector<SummaryColumn> c = {{"flight", "", At("/flight")},
+                                    {"comparison", "", At("/comparison")},
+                                    {"frames", "", At("/frames")},
+                                    {"ok", "", At("/detection/counts/ok")},
+                                    {"detection_rate", "[]", At("/detection/rate")},
+                                    {"compared_frames", "", At("/compared_frames")}};
+    for (const std::string kind : {"rms", "dc_offset", "rms_without_dc_offset"}) {
+      for (size_t i = 0; i < 6; ++i) {
+        const std::string state(kStateNames[i]);
+        c.push_back({state + '_' + kind, is_angle(i) ? "[rad]" : "[m]", At("/errors/" + state + '/' + kind)});
+      }
     }
-  }
-  return csv +
-         ",position_rms [m],position_median [m],position_p95 [m],position_max [m],rotation_rms [rad]"
-         ",position_over_range_rms [],mean_nees [],nees_inside_95 [],reprojection_rms [px]"
-         ",total_mean [us],total_p99 [us],problems\n";
+    for (const std::string kind : {"rms", "median", "p95", "max"}) {
+      c.push_back({"position_" + kind, "[m]", At("/errors/position_m/" + kind)});
+    }
+    c.push_back({"rotation_rms", "[rad]", At("/errors/rotation_rad/rms")});
+    c.push_back({"position_over_range_rms", "[]", At("/errors/position_over_range_rms")});
+    c.push_back({"mean_nees", "[]", At("/consistency/mean_nees")});
+    c.push_back({"nees_inside_95", "[]", At("/consistency/fraction_of_frames_inside_95")});
+    c.push_back({"reprojection_rms", "[px]", At("/reprojection_rms_px/rms")});
+    c.push_back({"total_mean", "[us]", At("/total_us/mean")});
+    c.push_back({"total_p99", "[us]", At("/total_us/p99")});
+    c.push_back({"problems", "", At("/problems")});
+    return c;
+  }();
+  return columns;
 }
 
-std::string summary_csv_row(const FlightScore& score) {
-  std::ostringstream csv;
-  csv << csv_field(score.name) << ',' << to_string(score.comparison) << ',' << score.frames.size() << ','
-      << score.detections.counts[0] << csv_number(score.detections.rate) << ',' << score.position.count;
-  for (const Statistics& s : score.states) csv << csv_number(s.rms);
-  for (const Statistics& s : score.states) csv << csv_number(s.mean);
-  for (const Statistics& s : score.states) csv << csv_number(s.rms_without_mean);
-  for (const double value :
-       {score.position.rms, score.position.median, score.position.p95, score.position.max, score.rotation.rms,
-        score.relative_position_rms, score.consistency.mean_nees, score.consistency.fraction_inside,
-        score.reprojection_px.rms, score.costs.total_us.mean, score.costs.total_us.p99}) {
-    csv << csv_number(value);
+Json value_of(const Json& summary, const SummaryColumn& column) {
+  if (!summary.contains(column.at)) return nullptr;
+  const Json& value = summary[column.at];
+  return value.is_array() ? Json(value.size()) : value;
+}
+
+std::string summary_csv_header() {
+  std::string csv;
+  for (const SummaryColumn& column : summary_columns()) {
+    csv += (csv.empty() ? "" : ",") + column.name + (column.unit.empty() ? "" : ' ' + column.unit);
   }
-  csv << ',' << score.problems.size() << '\n';
-  return csv.str();
+  return csv + '\n';
+}
+
+std::string summary_csv_row(const Json& summary) {
+  std::string csv;
+  for (const SummaryColumn& column : summary_columns()) {
+    const Json value = value_of(summary, column);
+    if (value.is_number_float()) {
+      csv += csv_number(value.get<double>());
+    } else {
+      csv += ',' + (value.is_string() ? csv_field(value.get<std::string>())
+                    : value.is_null() ? std::string()
+                                      : to_text(value));
+    }
+  }
+  return csv.substr(1) + '\n';
 }
 
 std::string errors_csv(const FlightScore& score) {

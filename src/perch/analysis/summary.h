@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "perch/analysis/score.h"
 
@@ -13,9 +14,19 @@ namespace perch {
 // summary.json of one flight. SI units, times of stages in us; unit and meaning are in the keys.
 nlohmann::ordered_json summary_json(const FlightScore& score);
 
-// summary.csv: a header that names the units, and a row a flight. Each with its line's end.
+// A flight's number (or word) in summary.csv and in the results' database, and where its summary.json has it.
+struct SummaryColumn {
+  std::string name;
+  std::string unit;  // "[m]", "[]" of a ratio; empty of a count or a word
+  nlohmann::ordered_json::json_pointer at;
+};
+const std::vector<SummaryColumn>& summary_columns();
+// Null where there is none; of a list, how many it has.
+nlohmann::ordered_json value_of(const nlohmann::ordered_json& summary, const SummaryColumn& column);
+
+// summary.csv: a header that names the units, and a row a flight, of its summary. Each with its line's end.
 std::string summary_csv_header();
-std::string summary_csv_row(const FlightScore& score);
+std::string summary_csv_row(const nlohmann::ordered_json& summary);
 
 // A row for each frame that both vision and navigation know.
 std::string errors_csv(const FlightScore& score);

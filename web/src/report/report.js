@@ -6,6 +6,7 @@ import {theme} from '../common/theme.js';
 import {TimeGroup, gapsOf, line, scatterPlot, shadeGaps, statusStrip, timePlot} from '../views/plots.js';
 import {StatePlots} from '../views/state_plots.js';
 import {Scene} from '../views/scene.js';
+import {seasonPage} from './season.js';
 
 const shownScale = (i) => (isAngle(i) ? DEG : 100);  // rad to degrees, m to cm
 const shownUnit = (i) => (isAngle(i) ? '°' : 'cm');
@@ -261,33 +262,23 @@ function flightPage(flight, index) {
   return page;
 }
 
-function overview(flights, choose) {
-  const rows = flights.map(({summary}, i) => {
-    const e = summary.errors;
-    const name = element('a', {href: '#' + i, onclick: (event) => { event.preventDefault(); choose(i); }}, summary.flight || `flight ${i}`);
-    return [name, String(summary.frames), percent(summary.detection.rate), cm(e.position_m.rms), percent(e.position_over_range_rms, 2), deg(e.rotation_rad.rms),
-            short(summary.consistency.mean_nees), ms(summary.total_us.mean), String(summary.problems.length)];
-  });
-  return section(plural(flights.length, 'flight'), null,
-      table(['flight', 'frames', 'with a pose', 'position RMS', 'over distance', 'attitude RMS', 'mean NEES', 'time a frame', 'problems'], rows, {class: 'overview'}));
-}
-
 function main() {
   const root = /** @type {HTMLElement} */ (document.getElementById('report'));
-  const sources = [...document.querySelectorAll('script.flight')];
-  const configuration = JSON.parse(document.getElementById('configuration')?.textContent ?? 'null');
-  const parsed = sources.map((source) => JSON.parse(source.textContent));
-  root.append(element('header', {}, element('h1', {}, 'Perch flight report')));
+  const json = (id) => JSON.parse(document.getElementById(id)?.textContent ?? 'null');
+  const configuration = json('configuration'), season = json('season');
+  const parsed = [...document.querySelectorAll('script.flight')].map((source) => JSON.parse(source.textContent));
+  const many = season && season.flight.length > 1 ? season : null;
+  root.append(element('header', {}, element('h1', {}, many ? 'Perch season report' : 'Perch flight report')));
   const place = element('div');
   let shown = 0;
 
   const show = (index) => {
+    if (!parsed.length) return;
     shown = index;
     place.querySelectorAll('figure, .scene').forEach((figure) => figure.dispatchEvent(new Event('perch-remove')));
     const flight = parsed[index];
     place.replaceChildren(flightPage(flight, index));
     for (const draw of flight.draw) draw();
-    root.querySelectorAll('.overview tbody tr').forEach((row, i) => row.classList.toggle('chosen', i === index));
   };
   const choose = (index) => {
     history.replaceState(null, '', '#' + index);
@@ -295,17 +286,24 @@ function main() {
     place.scrollIntoView({behavior: 'smooth'});
   };
 
-  if (parsed.length > 1) root.append(overview(parsed, choose));
+  // Few flights are in this page, many have pages of their own.
+  const inPage = many && parsed.length === many.flight.length;
+  const overview = many ? seasonPage(many, (i) => (inPage ? '#' + i : encodeURIComponent(many.flight[i]) + '/report.html'), inPage ? choose : null) : null;
+  if (overview) root.append(overview.element);
   root.append(place);
   if (configuration) root.append(element('details', {}, element('summary', {}, 'Configuration'), element('pre', {}, configuration)));
-  if (!parsed.length) return place.append(element('p', {class: 'notice'}, 'No flight.'));
+  if (!parsed.length && !many) return place.append(element('p', {class: 'notice'}, 'No flight.'));
 
+  const draw = (index) => {
+    if (overview) overview.draw();
+    show(index);
+  };
   const wanted = parseInt(location.hash.slice(1), 10);
-  show(wanted >= 0 && wanted < parsed.length ? wanted : 0);
+  draw(wanted >= 0 && wanted < parsed.length ? wanted : 0);
   // Plots have their colours painted in: a new scheme needs new plots. Paper is always white.
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => show(shown));
-  addEventListener('beforeprint', () => { document.documentElement.classList.add('paper-page'); show(shown); });
-  addEventListener('afterprint', () => { document.documentElement.classList.remove('paper-page'); show(shown); });
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => draw(shown));
+  addEventListener('beforeprint', () => { document.documentElement.classList.add('paper-page'); draw(shown); });
+  addEventListener('afterprint', () => { document.documentElement.classList.remove('paper-page'); draw(shown); });
 }
 
 main();

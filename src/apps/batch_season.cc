@@ -1,0 +1,67 @@
+#include "batch_season.h"
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "perch/analysis/report.h"
+#include "perch/analysis/results_database.h"
+#include "perch/analysis/season.h"
+#include "perch/analysis/summary.h"
+#include "perch/config/atomic_file.h"
+
+namespace perch {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// So many flights are in the page itself, which is then all there is to send to somebody; more are links.
+constexpr size_t kMostInPage = 20;
+constexpr size_t kMostBytesInPage = 20'000'000;
+
+std::string read(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be read");
+  return text.str();
+}
+
+Json read_summary(const fs::path& file) {
+  Json summary = Json::parse(read(file), nullptr, /*allow_exceptions=*/false);
+  if (!summary.is_object()) throw std::runtime_error(file.string() + ": no summary of a flight");
+  return summary;
+}
+
+}  // namespace
+
+void write_season(const BatchFolder& folder, std::span<const SeasonFlight> flights,
+                  const std::string& resolved_configuration) {
+  Season season;
+  ResultsDatabase database(folder.path() / "results.sqlite");
+  database.add_run("perch-batch " PERCH_VERSION, resolved_configuration);
+  std::string csv = summary_csv_header();
+  std::vector<std::string> data;
+  size_t bytes = 0;
+  for (const SeasonFlight& flight : flights) {
+    const auto failed = [&] { return failed_flight(flight.name, *flight.problem); };
+    const Json summary =
+        flight.problem ? summary_json(failed()) : read_summary(folder.of(flight.name) / "summary.json");
+    csv += summary_csv_row(summary);
+    season.add(summary);
+    database.add(summary);
+    if (flights.size() > kMostInPage || bytes > kMostBytesInPage) continue;
+    data.push_back(flight.problem ? flight_data({failed(), {}})
+                                  : flight_data_of_page(read(folder.of(flight.name) / "report.html")));
+    bytes += data.back().size();
+  }
+  if (bytes > kMostBytesInPage) data.clear();
+  database.commit();
+  write_whole_file(folder.path() / "summary.csv", csv);
+  write_whole_file(folder.path() / "report.html", season_html(season.json(), data, resolved_configuration));
+}
+
+}  // namespace perch

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "batch_folder.h"
+
+namespace perch {
+
+// A flight of a run that has come to an end: its result lies in OUT/FLIGHTNAME, or `problem` says why there
+// is none.
+struct SeasonFlight {
+  std::string name;
+  std::optional<std::string> problem;
+};
+
+// Writes what a run says of all its flights, OUT/summary.csv, report.html and results.sqlite, from their
+// folders: whoever estimated them, and when, the bytes are the same.
+void write_season(const BatchFolder& folder, std::span<const SeasonFlight> flights,
+                  const std::string& resolved_configuration);
+
+}  // namespace perch
