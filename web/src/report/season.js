@@ -20,7 +20,7 @@ const MEASURES = [
 ];
 
 const unitOf = (m) => (m.unit === '°' || m.unit === '' ? m.unit : ' ' + m.unit);
-const shown = (m, value) => (value == null ? '–' : short(value * m.scale) + unitOf(m));
+const shown = (m, value) => (value == null ? '–' : m.key === 'problems' ? String(value) : short(value * m.scale) + unitOf(m));
 const failed = (season, i) => season.comparison[i] === 'not estimated';
 
 export function quantile(sorted, fraction) {
