@@ -62,10 +62,10 @@ struct Calibration {
 // 0 to 1 and what is being done. May be empty.
 using CalibrationProgress = std::function<void(double, const std::string&)>;
 
-// Solves every lens model with and without regularisation, each from halves of the pictures too, and chooses: of
-// the regularised ones the leanest whose held-out error is within one standard error of the best (Breiman et al., Classification
-// and Regression Trees, 1984, 3.4.3). Never by the error of the fit itself: that is the smaller the more a
-// model can bend, and the fewer the pictures. The free solve takes its place where the
+// Solves every lens model with and without regularisation, each from halves of the pictures too, and chooses:
+// of the regularised ones the leanest whose held-out error is within one standard error of the best (Breiman
+// et al., Classification and Regression Trees, 1984, 3.4.3). Never by the error of the fit itself: that is
+// the smaller the more a model can bend, and the fewer the pictures. The free solve takes its place where the
 // regularisation has moved it by more than a sigma. Throws CalibrationError when none can be solved.
 Calibration calibrate_camera(const BoardViews& views, const CalibrationOptions& options,
                              const CalibrationProgress& progress = {});

@@ -76,7 +76,8 @@ std::vector<std::string> empty_places(const BoardViews& views) {
           corners += cells[static_cast<size_t>(y * kCells + x)];
       }
       if (corners == 0)
-        empty.push_back(std::string(row == 1 || column == 1 ? "at the " : "in the ") + kPlaces[static_cast<size_t>(3 * row + column)]);
+        empty.push_back(std::string(row == 1 || column == 1 ? "at the " : "in the ") +
+                        kPlaces[static_cast<size_t>(3 * row + column)]);
     }
   }
   return empty;

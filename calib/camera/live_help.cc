@@ -45,8 +45,11 @@ std::string number(double value) {
 
 std::unique_ptr<LiveSource> open(const std::string& source) {
   constexpr std::string_view kSimulation = "sim:";
-  if (source.starts_with(kSimulation)) return open_live_simulation(source.substr(kSimulation.size()));
-  return open_live_source(source);
+  LiveOptions options;
+  options.pace = Pace::kFast;  // of a recording no picture is left out
+  if (source.starts_with(kSimulation))
+    return open_live_simulation(source.substr(kSimulation.size()), options);
+  return open_live_source(source, options);
 }
 
 // On 95 % of the places where boards have been, at infinity, in the worst direction.

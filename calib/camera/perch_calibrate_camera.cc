@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "calib/camera/calibration_json.h"
+#include "calib/camera/calibration_report.h"
 #include "calib/camera/camera_model_file.h"
 #include "calib/camera/find_boards.h"
 #include "calib/camera/live_help.h"
@@ -29,6 +30,7 @@ DEFINE_string(dictionary, "4X4_50", "of a ChArUco board, as OpenCV names it");
 DEFINE_string(target, "", "in place of --board: a landing target's YAML, or a Kalibr AprilGrid's");
 DEFINE_string(output, "", "the camera model to write (.cameramodel); empty: only look for the board");
 DEFINE_string(json, "", "a summary for programs");
+DEFINE_string(report, "", "a page (.html) with the verdict and pictures of what it rests on");
 DEFINE_string(lens, "", "mrcal's lens models to compare, by commas (LENSMODEL_OPENCV4,LENSMODEL_OPENCV8)");
 DEFINE_string(require, "",
               "thresholds, exit 1 where one is not met: uncertainty_px=0.5,coverage=0.8 or recommended");
@@ -113,7 +115,8 @@ void check_flags(const CommandLine& line) {
   if (FLAGS_jobs < 0) throw UsageError("--jobs: expected 0 or more");
   if (std::isfinite(FLAGS_zoom) == FLAGS_zoom_table.empty())
     throw UsageError("--zoom and --zoom-table go together");
-  const bool writes = !FLAGS_json.empty() || !FLAGS_zoom_table.empty() || !FLAGS_require.empty();
+  const bool writes =
+      !FLAGS_json.empty() || !FLAGS_report.empty() || !FLAGS_zoom_table.empty() || !FLAGS_require.empty();
   if (FLAGS_output.empty() && writes) throw UsageError("--output: expected the file for the camera model");
 }
 
@@ -165,6 +168,8 @@ int finish(const Board& board, const BoardViews& views, const CalibrationOptions
   const Verdict verdict = judge(views, calibration, landing_target(board));
   write_camera_model(FLAGS_output, views, calibration.best());
   if (!FLAGS_json.empty()) write_calibration_json(FLAGS_json, views, calibration, verdict);
+  if (!FLAGS_report.empty())
+    write_calibration_report(FLAGS_report, views, calibration, verdict, FLAGS_output);
   if (!FLAGS_zoom_table.empty()) add_to_zoom_table(FLAGS_zoom_table, FLAGS_zoom, FLAGS_output);
   for (const std::string& remark : calibration.remarks) std::cerr << remark << '\n';
   std::cout << verdict.summary << '\n' << calibration.why << '\n';
