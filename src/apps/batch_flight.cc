@@ -15,6 +15,7 @@
 #include "perch/estimator/estimator.h"
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/flight.h"
+#include "perch/flight/head_angles.h"
 
 namespace perch {
 namespace {
@@ -26,11 +27,19 @@ constexpr size_t kFramesAhead = 4;
 
 CameraModel camera_of(const RunConfig& config, const Flight& flight) {
   if (!config.camera_model.empty()) return read_camera_model(config.camera_model);
+  if (config.zoom_table) return config.zoom_table->entries().front().model;
   if (flight.camera) return *flight.camera;
   throw std::runtime_error(flight.folder.string() +
                            ": no camera model: expected camera.model in the configuration, " +
                            "or mav0/cam0/camera.cameramodel or sensor.yaml in the flight" +
                            (flight.problems.empty() ? "" : "; " + flight.problems.front()));
+}
+
+// Of a zoom camera, the model at a frame's zoom.
+std::optional<CameraModel> zoomed_model(const RunConfig& config, const Flight& flight, int64_t timestamp_ns) {
+  const auto head = gimbal_at(flight.gimbal, timestamp_ns);
+  if (!config.zoom_table || !head) return std::nullopt;
+  return config.zoom_table->at(head->zoom);
 }
 
 // body_from_base of the flight's own mount, where the configuration says none.
@@ -144,7 +153,9 @@ std::vector<ReportPicture> draw_pictures(const BatchFlight& job, const FlightRes
       if (picture.shown.frame != i) continue;
       source->read(frame);
       if (!frame.grey.empty()) {
-        picture.jpeg = overlay_jpeg(frame.grey, job.config.target, &camera, result.estimates[i]);
+        const auto zoomed = zoomed_model(job.config, result.flight, frame.timestamp_ns);
+        picture.jpeg =
+            overlay_jpeg(frame.grey, job.config.target, zoomed ? &*zoomed : &camera, result.estimates[i]);
       }
     }
   }

@@ -26,7 +26,10 @@ Estimator::Aid FlightAids::from_flight(int64_t camera_time_ns) {
     aid.world_from_body = nav->world_from_body.rotation;
   }
   const double latency = chain_.pan_tilt ? chain_.pan_tilt->latency : 0;
-  aid.angles = head_angles_at(flight_.gimbal, camera_time_ns + std::llround(1e9 * latency));
+  if (const auto head = gimbal_at(flight_.gimbal, camera_time_ns + std::llround(1e9 * latency))) {
+    aid.angles = HeadAngles{head->pan, head->tilt};
+    aid.zoom = head->zoom;
+  }
   if (fuse_navigation_) aid.autopilot = said_until(camera_time_ns);
   return aid;
 }

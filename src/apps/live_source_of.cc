@@ -16,6 +16,9 @@ std::string rest_of(const std::string& source) { return source.substr(source.fin
 
 OpenedSource open_source_of(const LiveConfig& config) {
   const RunConfig& run = config.run;
+  if (run.zoom_table) {
+    throw ConfigError("camera.zoom_table: expected camera.model, as nothing tells a live run the zoom");
+  }
   std::unique_ptr<LiveSource> pictures;
   std::optional<CameraModel> camera;
   std::optional<Rigid3> body_from_camera;

@@ -1,5 +1,7 @@
 #include "perch/estimator/estimator.h"
 
+#include <gmock/gmock.h>
+
 #include <vector>
 
 #include "perch/geometry/euler.h"
@@ -65,6 +67,31 @@ TEST_F(Estimating, GivesEachFrameItsRowInTheirOrder) {
     // Corners to half a pixel of a target of 240 px: a few per cent is what is left to the worst direction.
     EXPECT_THAT(estimate.camera_from_target.mean, IsNearPose(pose, 0.05, 0.05));
   }
+}
+
+// The same pad from the same place while the lens zooms in: each frame through the lens of its own zoom.
+TEST_F(Estimating, TakesTheModelOfEachFramesZoom) {
+  const auto zoomed = [](double zoom) {
+    return CameraModel::pinhole(600 * zoom, 600 * zoom, 319.5, 239.5, 640, 480);
+  };
+  config.zoom_table = ZoomTable({{1, zoomed(1)}, {1.4, zoomed(1.4)}, {2, zoomed(2)}});
+  auto e = estimator();
+  const Rigid3 pose = looking_pose(5, 0.3, 1, 0.4);
+  int number = 0;
+  // 1.2 is between those calibrated, a place where the table is good to 0.5 %.
+  for (const auto& [zoom, relative] :
+       {std::pair(1.0, 0.01), {1.4, 0.01}, {1.2, 0.015}, {2.0, 0.01}, {1.0, 0.01}}) {
+    const Frame frame = frame_of(number++, picture_of(config.target, zoomed(zoom), pose));
+    Estimator::Aid aid;
+    aid.zoom = zoom;
+    const Estimate estimate = e.process(frame, aid);
+    ASSERT_EQ(estimate.status, EstimateStatus::kOk) << zoom;
+    EXPECT_NEAR(estimate.camera_from_target.mean.translation.norm(), 5, 5 * relative) << zoom;
+  }
+  EXPECT_EQ(e.process(seeing(number, pose)).status, EstimateStatus::kUnreadable);
+  Estimator::Aid beyond;
+  beyond.zoom = 3;
+  EXPECT_THAT(e.process(seeing(number, pose), beyond).problem, testing::HasSubstr("zoom 3"));
 }
 
 TEST_F(Estimating, SaysWhichPictureIsUnreadableAndWhy) {

@@ -77,13 +77,27 @@ const char* to_string(EstimateStatus status) {
 }
 
 Estimator::Estimator(const RunConfig& config, const CameraModel& camera)
-    : camera_(camera),
+    : config_(config),
+      camera_(camera),
       frames_(config.frames),
       gravity_sigma_(config.pose.gravity_sigma_deg * kRadFromDeg),
       follow_(config.detection.follow),
       detector_(make_detector(config.target, camera, config.detection)),
       pose_(config.target, camera, config.pose),
       filter_(config.tracking) {}
+
+// Another zoom is another lens, for everything that holds one. What is wrong with the zoom; empty: nothing.
+std::string Estimator::zoom_to(const std::optional<double>& zoom) {
+  if (!config_.zoom_table || (zoom && zoom == zoom_)) return {};
+  if (!zoom) return "nothing tells the zoom, and camera.zoom_table needs it";
+  const auto camera = config_.zoom_table->at(*zoom);
+  if (!camera) return "zoom " + std::to_string(*zoom) + ": beyond what the zoom table was calibrated for";
+  camera_ = *camera;
+  detector_ = make_detector(config_.target, camera_, config_.detection);
+  pose_ = PoseEstimator(config_.target, camera_, config_.pose);
+  zoom_ = zoom;
+  return {};
+}
 
 std::optional<Prediction> Estimator::predict(int64_t timestamp_ns,
                                              const std::optional<HeadAngles>& angles) const {
@@ -95,6 +109,7 @@ std::optional<Prediction> Estimator::predict(int64_t timestamp_ns,
 
 void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& estimate) {
   estimate.problem = unreadable(frame, camera_);
+  if (estimate.problem.empty()) estimate.problem = zoom_to(aid.zoom);
   if (!estimate.problem.empty()) {
     estimate.status = EstimateStatus::kUnreadable;
     return;

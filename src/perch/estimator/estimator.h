@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "perch/camera/camera_model.h"
@@ -21,7 +22,8 @@ namespace perch {
 // once.
 class Estimator {
  public:
-  // Throws std::invalid_argument when the configured method cannot serve the target.
+  // Of a zoom camera `camera` gives the pictures' size alone: each frame's zoom chooses the model. Throws
+  // std::invalid_argument when the configured method cannot serve the target.
   Estimator(const RunConfig& config, const CameraModel& camera);
 
   // What is known besides the picture at the frame's time: the angles of the pan/tilt head, and the attitude
@@ -31,6 +33,7 @@ class Estimator {
     std::optional<HeadAngles> angles;
     std::optional<Eigen::Quaterniond> world_from_body;
     std::vector<AutopilotSample> autopilot;
+    std::optional<double> zoom;  // in the zoom table's unit
   };
   Estimate process(const Frame& frame, const Aid& aid = {});
 
@@ -38,7 +41,11 @@ class Estimator {
   void estimate_pose(const Frame& frame, const Aid& aid, Estimate& estimate);
   std::optional<Prediction> predict(int64_t timestamp_ns, const std::optional<HeadAngles>& angles) const;
 
+  std::string zoom_to(const std::optional<double>& zoom);
+
+  RunConfig config_;
   CameraModel camera_;
+  std::optional<double> zoom_;  // that camera_ is of
   FrameChain frames_;
   double gravity_sigma_;  // rad
   bool follow_;

@@ -37,6 +37,12 @@ RunConfig read_run_config(Section root) {
   Section camera = root.section("camera");
   camera.read_source("source", config.source, {"video", "images", "flight", "sim"});
   if (camera.has("model")) camera.read("model", config.camera_model);
+  if (camera.has("zoom_table")) {
+    if (camera.has("model")) camera.fail("zoom_table", "either a model or a zoom_table");
+    std::filesystem::path table;
+    camera.read("zoom_table", table);
+    config.zoom_table = read_zoom_table(table);
+  }
   camera.read_choice("channel", config.channel,
                      {{"grey", Channel::kGrey},
                       {"red", Channel::kRed},

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "perch/camera/image_source.h"
 #include "perch/camera/live_source.h"
+#include "perch/camera/zoom_table.h"
 #include "perch/config/section.h"
 #include "perch/detection/make_detector.h"
 #include "perch/frames/frame_chain.h"
@@ -23,8 +25,9 @@ enum class ReplayAids {
 // The one YAML file of a run, live or batch (docs/FORMATS.md, Configuration).
 struct RunConfig {
   LandingTarget target;
-  std::string source;                  // camera.source; empty: the program's own argument says
-  std::filesystem::path camera_model;  // camera.model; empty: the flight's own
+  std::string source;                   // camera.source; empty: the program's own argument says
+  std::filesystem::path camera_model;   // camera.model; empty: the flight's own
+  std::optional<ZoomTable> zoom_table;  // camera.zoom_table, in place of a model: one for each frame's zoom
   Channel channel = Channel::kGrey;
   LiveOptions live;  // the rest of `camera`: what a live source is to do
   FrameChain frames;

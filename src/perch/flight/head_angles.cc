@@ -9,12 +9,12 @@ constexpr int64_t kMaxAgeNs = 100'000'000;
 
 }  // namespace
 
-std::optional<HeadAngles> head_angles_at(std::span<const GimbalSample> samples, int64_t camera_time_ns) {
+std::optional<GimbalSample> gimbal_at(std::span<const GimbalSample> samples, int64_t camera_time_ns) {
   const auto after = std::lower_bound(samples.begin(), samples.end(), camera_time_ns,
                                       [](const GimbalSample& s, int64_t t) { return s.timestamp_ns < t; });
-  const auto near = [&](const GimbalSample& s) -> std::optional<HeadAngles> {
+  const auto near = [&](const GimbalSample& s) -> std::optional<GimbalSample> {
     if (std::abs(s.timestamp_ns - camera_time_ns) > kMaxAgeNs) return std::nullopt;
-    return HeadAngles{s.pan, s.tilt};
+    return s;
   };
   if (samples.empty()) return std::nullopt;
   if (after == samples.begin()) return near(*after);
@@ -26,7 +26,15 @@ std::optional<HeadAngles> head_angles_at(std::span<const GimbalSample> samples, 
   }
   const double s = static_cast<double>(camera_time_ns - a.timestamp_ns) /
                    static_cast<double>(b.timestamp_ns - a.timestamp_ns);
-  return HeadAngles{(1 - s) * a.pan + s * b.pan, (1 - s) * a.tilt + s * b.tilt};
+  const auto between = [s](double from, double to) { return (1 - s) * from + s * to; };
+  return GimbalSample{camera_time_ns, between(a.pan, b.pan), between(a.tilt, b.tilt),
+                      between(a.zoom, b.zoom)};
+}
+
+std::optional<HeadAngles> head_angles_at(std::span<const GimbalSample> samples, int64_t camera_time_ns) {
+  const auto sample = gimbal_at(samples, camera_time_ns);
+  if (!sample) return std::nullopt;
+  return HeadAngles{sample->pan, sample->tilt};
 }
 
 }  // namespace perch
