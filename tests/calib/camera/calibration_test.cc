@@ -1,0 +1,195 @@
+// From corners to the verdict, on boards whose lens, bend and noise are known.
+
+#include "calib/camera/calibration.h"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "calib/camera/calibration_json.h"
+#include "calib/camera/calibration_report.h"
+#include "calib/camera/camera_model_file.h"
+#include "calib/camera/coverage.h"
+#include "calib/camera/verdict.h"
+#include "support/sharp_target.h"
+#include "support/temp_folder.h"
+#include "synthetic_boards.h"
+
+namespace perch {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+CalibrationOptions only(const std::string& lens) {
+  CalibrationOptions options;
+  options.lens_models = {lens};
+  options.ranges = {2};
+  return options;
+}
+
+Candidate once(const BoardViews& views, const std::string& lens) {
+  return calibrate_once(views, lens, only(lens));
+}
+
+// How far a lens is off the truth in the middle of the picture, px: over places where boards have been.
+double off_by(const CameraModel& truth, const CameraModel& found) {
+  const ModelDifference difference = model_difference(truth, found, 9, 7, std::vector<double>(63, 1));
+  double worst = 0;
+  for (int row = 2; row < 5; ++row) {
+    for (int column = 2; column < 7; ++column) worst = std::max(worst, difference.length.at(column, row));
+  }
+  return worst;
+}
+
+class LensModels : public testing::TestWithParam<const char*> {};
+
+// Noise of 0.1 px of 1200 corners; a spline has some hundred unknowns, so 0.5 px is what all stay below.
+TEST_P(LensModels, EachFindsALensThatItCanBe) {
+  TestRng rng;
+  const CameraModel camera = opencv4_camera();
+  const BoardViews views = synthetic_boards(camera, {.noise_px = 0.1, .views = 25}, rng);
+  const Candidate found = once(views, GetParam());
+  EXPECT_TRUE(found.usable()) << found.failure;
+  EXPECT_NEAR(found.fit.sigma_px, 0.1, 0.02);
+  EXPECT_LT(off_by(camera, found.fit.model()), 0.5);
+}
+INSTANTIATE_TEST_SUITE_P(All, LensModels,
+                         testing::Values("LENSMODEL_OPENCV4", "LENSMODEL_OPENCV5", "LENSMODEL_OPENCV8",
+                                         "LENSMODEL_OPENCV12",
+                                         "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=8_Ny=6_fov_x_deg=90"));
+
+// 130 degrees: the spline fits, and says itself that the rim, where few corners are, is known less.
+TEST(Calibration, ASplineKnowsAWideLensLessAtItsRim) {
+  TestRng rng;
+  const double f = 320 / (2 * std::tan(130 * kRadFromDeg / 4));
+  const CameraModel camera("LENSMODEL_STEREOGRAPHIC", {f, f, 319.5, 239.5}, 640, 480);
+  const BoardViews views = synthetic_boards(
+      camera, {.noise_px = 0.1, .views = 40, .nearest = 0.2, .farthest = 0.4, .keep_partial = true}, rng);
+  const Candidate found = once(views, "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=10_Ny=8_fov_x_deg=150");
+  EXPECT_LT(off_by(camera, found.fit.model()), 0.5);
+  const SensorMap map = uncertainty_map(found.fit, found.covariance, kAtInfinity, 9, 7);
+  EXPECT_LT(map.at(4, 3), 0.3);
+  EXPECT_GT(map.at(0, 0), 2 * map.at(4, 3));
+}
+
+TEST(Calibration, FindsThePictureWhoseCornersAreWrong) {
+  TestRng rng;
+  BoardViews views = synthetic_boards(opencv4_camera(), {}, rng);
+  for (BoardCorner& corner : views.views[7].corners)
+    corner.pixel += 3 * Eigen::Vector2d(rng.normal(), rng.normal());
+  const Calibration calibration = calibrate_camera(views, only("LENSMODEL_OPENCV4"));
+  const Verdict verdict = judge(views, calibration, sharp_target());
+  ASSERT_EQ(verdict.suspects.size(), 1u);
+  EXPECT_EQ(verdict.suspects[0].view, 7u);
+}
+
+TEST(Calibration, SaysThatParallelBoardsDoNotTellTheFocalLength) {
+  TestRng rng;
+  BoardViews views = synthetic_boards(opencv4_camera(), {.views = 1, .tilt_deg = 0, .spread = 0}, rng);
+  const BoardView first = views.views[0];
+  for (int k = 1; k < 10; ++k) {  // the same plane, moved sideways
+    views.views.push_back(first);
+    views.views.back().picture += std::to_string(k);
+    for (BoardCorner& corner : views.views.back().corners)
+      corner.pixel += Eigen::Vector2d(0.2 * rng.normal() + k, 0.2 * rng.normal());
+  }
+  // Either there is no solution, or it comes with that sentence.
+  try {
+    const Candidate found = once(views, "LENSMODEL_OPENCV4");
+    EXPECT_THAT(what_is_missing(views, found.fit), Contains(HasSubstr("focal length")));
+  } catch (const CalibrationError& e) {
+    EXPECT_STRNE(e.what(), "");
+  }
+}
+
+TEST(Calibration, OfOnePictureNothingIsCalledGood) {
+  TestRng rng;
+  const BoardViews views = synthetic_boards(opencv4_camera(), {.views = 1}, rng);
+  try {
+    const Calibration calibration = calibrate_camera(views, only("LENSMODEL_OPENCV4"));
+    const Verdict verdict = judge(views, calibration, sharp_target());
+    EXPECT_TRUE(std::ranges::any_of(verdict.gates, [](const Gate& gate) { return !gate.met; }));
+    EXPECT_THAT(verdict.missing, Contains(HasSubstr("There are 1 pictures")));
+  } catch (const CalibrationError& e) {
+    EXPECT_STRNE(e.what(), "");
+  }
+}
+
+TEST(Calibration, TakesBoardsWithMissingCorners) {
+  TestRng rng;
+  const CameraModel camera = opencv4_camera();
+  BoardViews views = synthetic_boards(camera, {}, rng);
+  for (BoardView& view : views.views)
+    std::erase_if(view.corners, [&](const BoardCorner&) { return rng.uniform(0, 1) < 0.35; });
+  const Candidate found = once(views, "LENSMODEL_OPENCV4");
+  EXPECT_NEAR(found.fit.sigma_px, 0.2, 0.02);
+  EXPECT_LT(off_by(camera, found.fit.model()), 1);
+}
+
+// What is written is read back to the last digit, with the covariance; summary and page hold the verdict.
+TEST(Calibration, ItsFilesSayWhatWasFound) {
+  TestRng rng;
+  const BoardViews views = synthetic_boards(opencv4_camera(), {}, rng);
+  const Calibration calibration = calibrate_camera(views, only("LENSMODEL_OPENCV4"));
+  const Verdict verdict = judge(views, calibration, sharp_target());
+  EXPECT_GT(verdict.coverage, 0.5);
+  ASSERT_EQ(verdict.landing.size(), 1u);
+  EXPECT_GT(verdict.landing[0].mean_m, 0);
+  const TempFolder folder;
+  write_camera_model(folder / "cam.cameramodel", views, calibration.best());
+  const CameraModel read = read_camera_model(folder / "cam.cameramodel");
+  EXPECT_EQ(read.intrinsics(), calibration.fit().intrinsics);
+  ASSERT_EQ(read.intrinsics_covariance().rows(), 8);
+  EXPECT_TRUE(read.intrinsics_covariance().isApprox(calibration.best().covariance.intrinsics(), 1e-12));
+  const auto json = nlohmann::json::parse(calibration_json_text(views, calibration, verdict));
+  EXPECT_EQ(json["chosen"]["lens"], "LENSMODEL_OPENCV4");
+  EXPECT_EQ(json["views"].size(), 20u);
+  EXPECT_NEAR(json["landing"][0]["mean_m"].get<double>(), verdict.landing[0].mean_m, 1e-12);
+  const std::string page = calibration_report_html(views, calibration, verdict, "cam<1>.cameramodel");
+  EXPECT_THAT(page, HasSubstr("cam&lt;1&gt;.cameramodel"));
+  EXPECT_THAT(page, testing::Not(HasSubstr("<script")));
+  EXPECT_THAT(page, testing::Not(HasSubstr("nan")));
+}
+
+TEST(Requirements, AreHeldAgainstTheCalibration) {
+  TestRng rng;
+  const BoardViews views = synthetic_boards(opencv4_camera(), {}, rng);
+  const Calibration calibration = calibrate_camera(views, only("LENSMODEL_OPENCV4"));
+  const Verdict verdict = judge(views, calibration, sharp_target());
+  const auto met = [&](const std::string& text) {
+    return check(verdict, calibration, parse_requirements(text)).at(0).met;
+  };
+  EXPECT_TRUE(met("sigma_px=0.3"));
+  EXPECT_FALSE(met("sigma_px=0.1"));
+  EXPECT_TRUE(met("coverage=0.3"));
+  EXPECT_FALSE(met("coverage=1"));
+  for (const char* wrong : {"beauty=1", "sigma_px", "sigma_px=", "sigma_px=x", "sigma_px=-1", "sigma_px=nan"})
+    EXPECT_THROW(parse_requirements(wrong), CalibrationError) << wrong;
+}
+
+// The spread of the answers of N seeds is what the covariance says: 20 % is 2.8 standard errors of 100.
+TEST(Calibration, ItsSigmaIsTheSpreadOfItsAnswers) {
+  const char* seeds = std::getenv("PERCH_CALIBRATION_SEEDS");
+  if (!seeds) GTEST_SKIP() << "PERCH_CALIBRATION_SEEDS=100 for the long one";
+  TestRng rng;
+  const CameraModel camera = opencv4_camera();
+  Eigen::Array<double, 8, 1> squares = Eigen::Array<double, 8, 1>::Zero();
+  const int count = std::atoi(seeds);
+  for (int seed = 0; seed < count; ++seed) {
+    const Candidate found = once(synthetic_boards(camera, {}, rng), "LENSMODEL_OPENCV4");
+    for (Eigen::Index i = 0; i < 8; ++i) {
+      const auto k = static_cast<size_t>(i);
+      squares[i] +=
+          std::pow(found.fit.intrinsics[k] - camera.intrinsics()[k], 2) / found.covariance.matrix(i, i);
+    }
+  }
+  const Eigen::Array<double, 8, 1> ratio = (squares / count).sqrt();
+  std::cout << "found over predicted, by parameter: " << ratio.transpose() << ", mean " << ratio.mean()
+            << "\n";
+  EXPECT_NEAR(ratio.mean(), 1, 0.2);
+}
+
+}  // namespace
+}  // namespace perch
