@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <memory>
 
@@ -37,9 +38,11 @@ CameraModel camera_of(const RunConfig& config, const Flight& flight) {
 
 // Of a zoom camera, the model at a frame's zoom.
 std::optional<CameraModel> zoomed_model(const RunConfig& config, const Flight& flight, int64_t timestamp_ns) {
-  const auto head = gimbal_at(flight.gimbal, timestamp_ns);
-  if (!config.zoom_table || !head) return std::nullopt;
-  return config.zoom_table->at(head->zoom);
+  if (!config.zoom_table) return std::nullopt;
+  const double latency = config.frames.pan_tilt ? config.frames.pan_tilt->latency : 0;
+  const auto head = gimbal_at(flight.gimbal, timestamp_ns + std::llround(1e9 * latency));
+  if (!head || !head->zoom) return std::nullopt;
+  return config.zoom_table->at(*head->zoom);
 }
 
 // body_from_base of the flight's own mount, where the configuration says none.

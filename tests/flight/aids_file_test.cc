@@ -45,7 +45,7 @@ bool same(const Estimator::Aid& a, const Estimator::Aid& b) {
   for (size_t i = 0; i < a.autopilot.size(); ++i) {
     if (!same(a.autopilot[i], b.autopilot[i])) return false;
   }
-  return same(a.angles, b.angles) && same(a.world_from_body, b.world_from_body);
+  return same(a.angles, b.angles) && same(a.world_from_body, b.world_from_body) && same(a.zoom, b.zoom);
 }
 
 // Any double there is: all exponents, both zeros, what is not finite.
@@ -65,6 +65,7 @@ Estimator::Aid any_aid(TestRng& rng) {
     aid.angles =
         HeadAngles{any_number(rng), any_number(rng), any_number(rng), any_number(rng), any_number(rng)};
   if (perhaps()) aid.world_from_body = any_quaternion(rng);
+  if (perhaps()) aid.zoom = any_number(rng);
   aid.autopilot.resize(rng.bits() % 4);
   for (AutopilotSample& sample : aid.autopilot) {
     sample.timestamp_ns = static_cast<int64_t>(rng.bits());
@@ -103,7 +104,7 @@ TEST(AidsFile, EveryRowHasAllColumns) {
   for (int i = 0; i < 50; ++i) append_aid(i, any_aid(rng), csv);
   std::istringstream lines(csv);
   for (std::string line; std::getline(lines, line);)
-    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 20) << line;
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 21) << line;
 }
 
 TEST(AidsFile, CutOffAnywhereItKeepsTheFramesBefore) {
@@ -125,6 +126,24 @@ TEST(AidsFile, CutOffAnywhereItKeepsTheFramesBefore) {
     ASSERT_EQ(frames.size(), static_cast<size_t>(whole)) << size;
     EXPECT_EQ(problems.size(), csv[size - 1] == '\n' ? 0u : 1u) << size;
   }
+}
+
+// A recording of before there was a zoom has one column less.
+TEST(AidsFile, ReadsARecordingWithoutAZoom) {
+  Estimator::Aid aid;
+  aid.angles = HeadAngles{0.1, 0.2};
+  aid.zoom = 0.5;
+  std::string row, csv = aids_header();
+  append_aid(7, aid, row);
+  csv.erase(csv.rfind(",zoom []"), 8);
+  csv += row.substr(0, row.rfind(',')) + "\n";
+  const TempFolder folder;
+  std::vector<std::string> problems;
+  const auto frames = read_aids(folder.write("aids.csv", csv), problems);
+  EXPECT_THAT(problems, IsEmpty());
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_TRUE(same(frames[0].aid.angles, aid.angles));
+  EXPECT_FALSE(frames[0].aid.zoom);
 }
 
 TEST(AidsFile, ABrokenRowCostsItsFrameOnly) {

@@ -67,6 +67,8 @@ TEST_F(Recording, IsAFlightThatReadsBackAlike) {
   EXPECT_EQ(flight.nav.samples[0].body_velocity_in_world, nav.body_velocity_in_world);
   ASSERT_EQ(flight.gimbal.size(), 20u);
   EXPECT_EQ(flight.gimbal[7].tilt, aid(7).angles->tilt);
+  EXPECT_EQ(flight.gimbal[7].zoom, aid(7).zoom);
+  EXPECT_EQ(flight.gimbal[8].zoom, std::nullopt);
 }
 
 TEST_F(Recording, WithoutMountOrNavigationHasNone) {

@@ -229,9 +229,10 @@ TEST(Flight, QuotesOfBytesWhatALineHolds) {
 TEST(Flight, GimbalAnglesAreInRadians) {
   const FlightFolder folder;
   folder.write("mav0/gimbal0/data.csv",
-               "#timestamp [ns],pan [rad],tilt [rad],zoom []\n5,0.1,-0.2,3\n6,nan,0,1\n");
+               "#timestamp [ns],pan [rad],tilt [rad],zoom []\n5,0.1,-0.2,3\n6,nan,0,1\n7,0.1,-0.2,\n");
   const auto gimbal = folder.read().gimbal;
-  ASSERT_EQ(gimbal.size(), 1U);
+  ASSERT_EQ(gimbal.size(), 2U);
+  EXPECT_FALSE(gimbal[1].zoom);
   EXPECT_EQ(gimbal[0].timestamp_ns, 5);
   EXPECT_EQ(gimbal[0].pan, 0.1);
   EXPECT_EQ(gimbal[0].tilt, -0.2);

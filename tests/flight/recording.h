@@ -113,6 +113,7 @@ class Recording : public testing::Test {
   static Estimator::Aid aid(int i) {
     Estimator::Aid a;
     a.angles = HeadAngles{0.1 * i, 1.0 / (i + 3)};
+    if (i % 2 == 1) a.zoom = 1.0 / i;
     a.world_from_body = Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5);
     a.autopilot.resize(2);
     a.autopilot[1].timestamp_ns = kStartNs + i;

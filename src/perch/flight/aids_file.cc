@@ -13,7 +13,7 @@ constexpr std::string_view kFrame = "frame", kAutopilot = "autopilot";
 
 // A number of each row that is not there is an empty field. Not finite ones are numbers, too: the estimator
 // was given them.
-constexpr std::array<ColumnName, 21> kColumns{"timestamp [ns]",
+constexpr std::array<ColumnName, 22> kColumns{"timestamp [ns]",
                                               "kind",
                                               "said",
                                               "q_w",
@@ -33,9 +33,10 @@ constexpr std::array<ColumnName, 21> kColumns{"timestamp [ns]",
                                               "tilt [rad]",
                                               "pan_sigma [rad]",
                                               "tilt_sigma [rad]",
-                                              "roll [rad]"};
+                                              "roll [rad]",
+                                              "zoom []"};
 constexpr size_t kTime = 0, kKind = 1, kSaid = 2, kAttitude = 3, kVelocity = 7, kAngularVelocity = 10,
-                 kSigmas = 13, kHead = 16;
+                 kSigmas = 13, kHead = 16, kZoom = 21;
 
 // As they are: the sign of a quaternion, which is no matter to a rotation, may be one to a rounding.
 void append_quaternion(const std::optional<Eigen::Quaterniond>& q, std::string& csv) {
@@ -59,7 +60,7 @@ void append_sample(const AutopilotSample& sample, std::string& csv) {
   for (const double sigma : {sample.attitude_sigma, sample.velocity_sigma, sample.angular_velocity_sigma}) {
     append_field(csv, sigma);
   }
-  csv += ",,,,,\n";
+  csv += ",,,,,,\n";
 }
 
 class AidRow {
@@ -68,7 +69,8 @@ class AidRow {
       : fields_(csv.fields()), columns_(columns) {}
 
   std::string_view text(size_t column) const {
-    return columns_[column] < fields_.size() ? fields_[columns_[column]] : std::string_view{};
+    return column < columns_.size() && columns_[column] < fields_.size() ? fields_[columns_[column]]
+                                                                         : std::string_view{};
   }
   int64_t integer(size_t column) const {
     const auto value = parse_integer(text(column));
@@ -121,6 +123,7 @@ FrameAid frame_of(const AidRow& row, std::vector<AutopilotSample>& said) {
   if (!row.text(kHead).empty())
     frame.aid.angles = HeadAngles{row.number(kHead), row.number(kHead + 1), row.number(kHead + 2),
                                   row.number(kHead + 3), row.number(kHead + 4)};
+  if (!row.text(kZoom).empty()) frame.aid.zoom = row.number(kZoom);
   frame.aid.autopilot = std::move(said);
   return frame;
 }
@@ -151,12 +154,16 @@ void append_aid(int64_t frame_timestamp_ns, const Estimator::Aid& aid, std::stri
   } else {
     csv.append(5, ',');
   }
+  csv += ',';
+  if (aid.zoom) append_number(csv, *aid.zoom);
   csv += '\n';
 }
 
 std::vector<FrameAid> read_aids(const std::filesystem::path& file, std::vector<std::string>& problems) {
   CsvReader csv(file, LastLine::kMustEnd);
-  const std::vector<size_t> columns = csv.columns(kColumns);
+  // The first recordings knew no zoom.
+  const size_t count = kColumns.size() - (csv.has_column(kColumns[kZoom]) ? 0 : 1);
+  const std::vector<size_t> columns = csv.columns(std::span(kColumns).first(count));
   std::vector<FrameAid> frames;
   std::vector<AutopilotSample> said;
   while (csv.next()) {

@@ -13,9 +13,9 @@
 namespace perch {
 
 struct GimbalSample {
-  int64_t timestamp_ns = 0;  // camera clock
-  double pan = 0, tilt = 0;  // rad
-  double zoom = 0;
+  int64_t timestamp_ns = 0;    // camera clock
+  double pan = 0, tilt = 0;    // rad
+  std::optional<double> zoom;  // as the camera tells it; empty where it has not
 };
 
 // A recorded flight, an ASL (EuRoC) folder, without its pictures: those come from

@@ -185,7 +185,9 @@ void FlightRecorder::add_rows(const Frame& frame, const Estimator::Aid& aid, con
     append_number(row_, frame.timestamp_ns);
     append_field(row_, aid.angles->pan);
     append_field(row_, aid.angles->tilt);
-    row_ += ",1\n";
+    row_ += ',';
+    if (aid.zoom) append_number(row_, *aid.zoom);
+    row_ += '\n';
   });
 }
 

@@ -27,8 +27,9 @@ std::optional<GimbalSample> gimbal_at(std::span<const GimbalSample> samples, int
   const double s = static_cast<double>(camera_time_ns - a.timestamp_ns) /
                    static_cast<double>(b.timestamp_ns - a.timestamp_ns);
   const auto between = [s](double from, double to) { return (1 - s) * from + s * to; };
-  return GimbalSample{camera_time_ns, between(a.pan, b.pan), between(a.tilt, b.tilt),
-                      between(a.zoom, b.zoom)};
+  GimbalSample sample{camera_time_ns, between(a.pan, b.pan), between(a.tilt, b.tilt), {}};
+  if (a.zoom && b.zoom) sample.zoom = between(*a.zoom, *b.zoom);
+  return sample;
 }
 
 std::optional<HeadAngles> head_angles_at(std::span<const GimbalSample> samples, int64_t camera_time_ns) {

@@ -120,13 +120,14 @@ std::vector<GimbalSample> read_gimbal(const std::filesystem::path& file, std::ve
   while (csv.next()) {
     GimbalSample sample;
     std::array<double, 3> n{};
-    const std::string problem =
-        read_row(csv, kGimbalColumns, columns, kGimbalColumns.size(), sample.timestamp_ns, n);
+    constexpr size_t kRequired = 3;  // not all heads tell a zoom
+    const std::string problem = read_row(csv, kGimbalColumns, columns, kRequired, sample.timestamp_ns, n);
     if (!problem.empty()) {
       problems.push_back(csv.place() + ": " + problem);
       continue;
     }
-    sample.pan = n[0], sample.tilt = n[1], sample.zoom = n[2];
+    sample.pan = n[0], sample.tilt = n[1];
+    if (std::isfinite(n[2])) sample.zoom = n[2];
     samples.push_back(sample);
     places.push_back(csv.place());
   }
