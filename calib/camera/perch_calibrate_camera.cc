@@ -158,6 +158,20 @@ FoundBoards find(const Board& board, const PictureList& pictures, const Calibrat
   return found;
 }
 
+// How well the table says what is between its zooms, by those that have one on either side.
+void add_to_table() {
+  if (add_to_zoom_table(FLAGS_zoom_table, FLAGS_zoom, FLAGS_output) < 2) {
+    std::cout << FLAGS_zoom_table << ": the first zoom; a table needs two\n";
+    return;
+  }
+  const ZoomTable table = read_zoom_table(FLAGS_zoom_table);
+  const std::vector<double> held_out = table.held_out_px();
+  for (size_t i = 0; i < held_out.size(); ++i) {
+    std::cout << FLAGS_zoom_table << ": without zoom " << table.entries()[i + 1].zoom
+              << " its neighbours put what it sees up to " << held_out[i] << " px elsewhere\n";
+  }
+}
+
 int finish(const Board& board, const BoardViews& views, const CalibrationOptions& options) {
   Calibration calibration;
   {
@@ -170,7 +184,7 @@ int finish(const Board& board, const BoardViews& views, const CalibrationOptions
   if (!FLAGS_json.empty()) write_calibration_json(FLAGS_json, views, calibration, verdict);
   if (!FLAGS_report.empty())
     write_calibration_report(FLAGS_report, views, calibration, verdict, FLAGS_output);
-  if (!FLAGS_zoom_table.empty()) add_to_zoom_table(FLAGS_zoom_table, FLAGS_zoom, FLAGS_output);
+  if (!FLAGS_zoom_table.empty()) add_to_table();
   for (const std::string& remark : calibration.remarks) std::cerr << remark << '\n';
   std::cout << verdict.summary << '\n' << calibration.why << '\n';
   for (const std::string& warning : verdict.warnings) std::cout << "warning: " << warning << '\n';

@@ -71,29 +71,6 @@ void look_at_uncertainty(const BoardViews& views, const Candidate& best, Verdict
   verdict.uncertainty_px = within.empty() ? kNaN : within[within.size() * 95 / 100];
 }
 
-// A rolling shutter under a moving camera shears or stretches each picture its own way, and what of that is
-// common to all is a slope of the vertical errors over the rows.
-void look_at_rows(const BoardViews& views, const LensFit& fit, Verdict& verdict) {
-  double n = 0, y1 = 0, y2 = 0, e1 = 0, ye = 0;
-  for (size_t i = 0; i < fit.corners.size(); ++i) {
-    for (size_t k = 0; k < fit.corners[i].size(); ++k) {
-      if (fit.corners[i][k].outlier) continue;
-      const double y = views.views[i].corners[k].pixel.y() / views.height - 0.5,
-                   e = fit.corners[i][k].error_px.y();
-      n += 1, y1 += y, y2 += y * y, e1 += e, ye += y * e;
-    }
-  }
-  const double spread = y2 - y1 * y1 / n;
-  verdict.row_trend_px = (ye - y1 * e1 / n) / spread;
-  verdict.row_trend_sigma = fit.sigma_px / std::sqrt(spread);
-  if (std::abs(verdict.row_trend_px) > 5 * verdict.row_trend_sigma && std::abs(verdict.row_trend_px) > 0.05) {
-    verdict.warnings.push_back(
-        "The vertical errors change by " + number(verdict.row_trend_px) +
-        " px from the top of the picture to its bottom: a rolling shutter under a moving "
-        "camera does that. Hold camera and board still, or use a global shutter.");
-  }
-}
-
 // Median of the views' root mean squares, and those that stand out of it.
 void look_at_views(const BoardViews& views, const LensFit& fit, Verdict& verdict) {
   constexpr double kStandsOut = 2.5;  // times the median: noise alone makes a view of 20 corners 1.5 in 1000
@@ -149,7 +126,7 @@ void look_at_regions(const BoardViews& views, const LensFit& fit, Verdict& verdi
     }
   }
   double most = 0;
-  int leaning = 0;
+  int& leaning = verdict.leaning_regions;
   for (const auto& sum : sums) {
     if (sum.z() < 30) continue;
     const double mean = sum.head<2>().norm() / sum.z();
@@ -163,6 +140,16 @@ void look_at_regions(const BoardViews& views, const LensFit& fit, Verdict& verdi
                                " px at most: this lens model does not bend as the lens does. Try a "
                                "richer one (OPENCV8, or SPLINED_STEREOGRAPHIC with 100 pictures or more).");
   }
+}
+
+// Where the lens model fits, a picture that is sheared its own way was not taken at one moment.
+void look_at_rows(const BoardViews& views, const LensFit& fit, Verdict& verdict) {
+  verdict.row_shear = row_shear(views, fit);
+  if (!verdict.row_shear.shows() || verdict.leaning_regions > 0) return;
+  verdict.warnings.push_back(
+      "Each picture is sheared its own way, by " + number(verdict.row_shear.shift_px) +
+      " px from its top to its bottom: a rolling shutter does that when camera or board "
+      "moves. Hold both still, or use a global shutter.");
 }
 
 void look_at_board(const BoardViews& views, const Candidate& best, Verdict& verdict) {
@@ -261,9 +248,9 @@ Verdict judge(const BoardViews& views, const Calibration& calibration, const Lan
   for (const double range : calibration.ranges)
     verdict.landing.push_back(landing_error(best.fit, best.covariance, target, range));
   verdict.missing = what_is_missing(views, best.fit);
-  look_at_rows(views, best.fit, verdict);
   look_at_views(views, best.fit, verdict);
   look_at_regions(views, best.fit, verdict);
+  look_at_rows(views, best.fit, verdict);
   look_at_board(views, best, verdict);
   if (cross && verdict.halves_ratio > 2) {
     verdict.warnings.push_back("The lenses of the two halves differ " + number(verdict.halves_ratio) +

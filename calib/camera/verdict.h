@@ -6,6 +6,7 @@
 
 #include "calib/camera/calibration.h"
 #include "calib/camera/landing_error.h"
+#include "calib/camera/row_shear.h"
 
 namespace perch {
 
@@ -50,9 +51,8 @@ struct Verdict {
   double coverage = 0;        // part of the picture
   double halves_ratio = 0;    // NaN without cross-validation
   double outliers = 0;        // part
-  // The trend of the vertical errors with the row, px from the top of the picture to its bottom, and how sure
-  // it is.
-  double row_trend_px = 0, row_trend_sigma = 0;
+  int leaning_regions = 0;    // of 16 parts of the picture, in which the errors lean one way
+  RowShear row_shear;
   std::vector<LandingError> landing;
   std::vector<std::string> missing;
   std::vector<std::string> warnings;  // what in the errors does not look as it should

@@ -146,7 +146,7 @@ ZoomTable read_zoom_table(const fs::path& file) {
   }
 }
 
-void add_to_zoom_table(const fs::path& file, double zoom, const fs::path& model) {
+size_t add_to_zoom_table(const fs::path& file, double zoom, const fs::path& model) {
   std::vector<std::pair<double, fs::path>> entries{{zoom, model}};
   std::error_code ignored;
   if (fs::exists(file, ignored)) {
@@ -172,6 +172,7 @@ void add_to_zoom_table(const fs::path& file, double zoom, const fs::path& model)
     yaml << "  - {zoom: " << at << ", model: \"" << relative.generic_string() << "\"}\n";
   }
   write_whole_file(file, yaml.str());
+  return entries.size();
 }
 
 }  // namespace perch

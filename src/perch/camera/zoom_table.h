@@ -46,8 +46,9 @@ class ZoomTable {
 // The file: {models: [{zoom: 1, model: zoom_1.cameramodel}, ...]}, paths relative to it. Throws ConfigError.
 ZoomTable read_zoom_table(const std::filesystem::path& file);
 
-// Adds a calibrated zoom to the file, or makes it; what is there at the same zoom is replaced. Throws
-// ConfigError for a file that is no zoom table, std::runtime_error for one that cannot be written.
-void add_to_zoom_table(const std::filesystem::path& file, double zoom, const std::filesystem::path& model);
+// Adds a calibrated zoom to the file, or makes it; what is there at the same zoom is replaced. How many zooms
+// it has then: one is no table yet. Throws ConfigError for a file that is no zoom table, std::runtime_error
+// for one that cannot be written.
+size_t add_to_zoom_table(const std::filesystem::path& file, double zoom, const std::filesystem::path& model);
 
 }  // namespace perch

@@ -57,7 +57,7 @@ TEST_P(LensModels, EachFindsALensThatItCanBe) {
 }
 INSTANTIATE_TEST_SUITE_P(All, LensModels,
                          testing::Values("LENSMODEL_OPENCV4", "LENSMODEL_OPENCV5", "LENSMODEL_OPENCV8",
-                                         "LENSMODEL_OPENCV12",
+                                         "LENSMODEL_OPENCV12", "LENSMODEL_CAHVOR",
                                          "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=8_Ny=6_fov_x_deg=90"));
 
 // 130 degrees: the spline fits, and says itself that the rim, where few corners are, is known less.
@@ -117,6 +117,37 @@ TEST(Calibration, OfOnePictureNothingIsCalledGood) {
   }
 }
 
+// Each picture moves by its own v while its rows are read, 1 px or so of the height.
+BoardViews rolled(BoardViews views, double shift_px, TestRng& rng) {
+  for (BoardView& view : views.views) {
+    const Eigen::Vector2d v(shift_px * rng.normal(), shift_px * rng.normal());
+    for (BoardCorner& corner : view.corners) corner.pixel += corner.pixel.y() / views.height * v;
+  }
+  return views;
+}
+
+TEST(Calibration, RemarksOnARollingShutter) {
+  TestRng rng;
+  const BoardViews still = synthetic_boards(opencv4_camera(), {.noise_px = 0.05}, rng);
+  const auto warnings = [](const BoardViews& views) {
+    const Calibration calibration = calibrate_camera(views, only("LENSMODEL_OPENCV4"));
+    return judge(views, calibration, sharp_target()).warnings;
+  };
+  EXPECT_THAT(warnings(still), testing::Not(Contains(HasSubstr("rolling shutter"))));
+  EXPECT_THAT(warnings(rolled(still, 1, rng)), Contains(HasSubstr("rolling shutter")));
+}
+
+// 4 % wider than high squares: no lens and no pose takes that up.
+TEST(Calibration, WarnsOfABoardOfAnotherShape) {
+  TestRng rng;
+  SyntheticBoards boards{.noise_px = 0.05};
+  boards.stretch = 1.04;
+  const BoardViews views = synthetic_boards(opencv4_camera(), boards, rng);
+  const Calibration calibration = calibrate_camera(views, only("LENSMODEL_OPENCV4"));
+  const Verdict verdict = judge(views, calibration, sharp_target());
+  EXPECT_FALSE(verdict.gates[3].met) << calibration.fit().sigma_px;
+}
+
 TEST(Calibration, TakesBoardsWithMissingCorners) {
   TestRng rng;
   const CameraModel camera = opencv4_camera();
@@ -169,26 +200,33 @@ TEST(Requirements, AreHeldAgainstTheCalibration) {
     EXPECT_THROW(parse_requirements(wrong), CalibrationError) << wrong;
 }
 
-// The spread of the answers of N seeds is what the covariance says: 20 % is 2.8 standard errors of 100.
+// Answers of N seeds are spread as the covariance says: 20 % is 2.8 standard errors of 100. Of few seeds, as
+// run every time, a tenth of that accuracy: a chi squared of 8 N, whose errors hang together by 3 or so.
 TEST(Calibration, ItsSigmaIsTheSpreadOfItsAnswers) {
   const char* seeds = std::getenv("PERCH_CALIBRATION_SEEDS");
-  if (!seeds) GTEST_SKIP() << "PERCH_CALIBRATION_SEEDS=100 for the long one";
+  const int count = seeds ? std::max(10, std::atoi(seeds)) : 10;
   TestRng rng;
   const CameraModel camera = opencv4_camera();
   Eigen::Array<double, 8, 1> squares = Eigen::Array<double, 8, 1>::Zero();
-  const int count = std::atoi(seeds);
+  int within = 0;
   for (int seed = 0; seed < count; ++seed) {
     const Candidate found = once(synthetic_boards(camera, {}, rng), "LENSMODEL_OPENCV4");
     for (Eigen::Index i = 0; i < 8; ++i) {
       const auto k = static_cast<size_t>(i);
-      squares[i] +=
-          std::pow(found.fit.intrinsics[k] - camera.intrinsics()[k], 2) / found.covariance.matrix(i, i);
+      const double in_sigmas =
+          (found.fit.intrinsics[k] - camera.intrinsics()[k]) / std::sqrt(found.covariance.matrix(i, i));
+      squares[i] += in_sigmas * in_sigmas;
+      within += std::abs(in_sigmas) < 3;
     }
   }
   const Eigen::Array<double, 8, 1> ratio = (squares / count).sqrt();
-  std::cout << "found over predicted, by parameter: " << ratio.transpose() << ", mean " << ratio.mean()
-            << "\n";
-  EXPECT_NEAR(ratio.mean(), 1, 0.2);
+  std::cout << count << " seeds: found over predicted, by parameter: " << ratio.transpose() << ", mean "
+            << ratio.mean() << "; " << within << " of " << 8 * count << " within 3 sigma\n";
+  // 0.3 % of a normal distribution are beyond 3 sigma; parameters of one solve go there together.
+  EXPECT_GE(within, 8 * count - std::max(4, 8 * count / 100));
+  EXPECT_NEAR(ratio.mean(), 1, seeds ? 0.2 : 0.4);
+  // 20 %, and what a deviation of 100 scatters: 7 %.
+  EXPECT_LT((ratio - 1).abs().maxCoeff(), seeds ? 0.25 : 1);
 }
 
 }  // namespace

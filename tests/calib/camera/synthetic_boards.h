@@ -16,6 +16,7 @@ namespace perch {
 struct SyntheticBoards {
   BoardGrid grid{8, 6, 0.04};
   Eigen::Vector2d warp{0.001, -0.0005};  // m, as mrcal means it
+  double stretch = 1;                    // of the columns' distance, unlike the grid has it
   double noise_px = 0.2;
   int views = 20;
   double tilt_deg = 40;                   // at most
@@ -27,7 +28,7 @@ struct SyntheticBoards {
 inline Eigen::Vector3d board_point(const SyntheticBoards& s, int column, int row) {
   const double x = static_cast<double>(column) / (s.grid.columns - 1),
                y = static_cast<double>(row) / (s.grid.rows - 1);
-  return {column * s.grid.spacing, row * s.grid.spacing,
+  return {s.stretch * column * s.grid.spacing, row * s.grid.spacing,
           4 * s.warp.x() * x * (1 - x) + 4 * s.warp.y() * y * (1 - y)};
 }
 
