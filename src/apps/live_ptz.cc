@@ -1,6 +1,7 @@
 #include "live_ptz.h"
 
 #include <chrono>
+#include <cmath>
 
 #include "perch/config/error.h"
 #include "perch/geometry/euler.h"
@@ -13,6 +14,9 @@ using namespace std::chrono_literals;
 
 // A packet's bytes take 5 to 16 ms at 9600 baud.
 constexpr auto kTick = 2ms;
+
+// Between where the zoom was told to go and where it says it is, of the whole way.
+constexpr double kZoomThere = 0.01;
 
 bool take(std::string_view& text, std::string_view prefix) {
   if (!text.starts_with(prefix)) return false;
@@ -107,6 +111,12 @@ void LivePtz::turn() {
 std::optional<HeadAngles> LivePtz::angles_at(int64_t time_ns) const {
   const std::lock_guard lock(mutex_);
   return head_.at(time_ns);
+}
+
+std::optional<double> LivePtz::zoom() const {
+  const std::lock_guard lock(mutex_);
+  const auto zoom = head_.zoom();
+  return zoom && std::abs(*zoom - options_.zoom) < kZoomThere ? zoom : std::nullopt;
 }
 
 void LivePtz::report(const std::optional<VehicleState>& state,

@@ -23,7 +23,7 @@ struct PtzOptions {
   visca::ViscaOptions visca;
   HeadControlOptions control;
   bool follow = true;  // else its angles are read only
-  double zoom = 0;     // told once it answers: the one that camera.model is of
+  double zoom = 0;  // told once it answers: the one that camera.model is of, or one within camera.zoom_table
 };
 
 // Empty without `ptz.device`. Throws ConfigError.
@@ -37,6 +37,8 @@ class LivePtz {
   ~LivePtz();  // stops the head, ends the thread
 
   std::optional<HeadAngles> angles_at(int64_t time_ns) const;
+  // As the camera tells it, once it is where it was told to go; empty before, and while somebody moves it.
+  std::optional<double> zoom() const;
   // Where the vehicle is after a picture, and its attitude where that is known: the head follows.
   void report(const std::optional<VehicleState>& state,
               const std::optional<Eigen::Quaterniond>& world_from_body);

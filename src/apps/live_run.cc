@@ -138,7 +138,10 @@ Estimator::Aid LiveRun::aid_at(int64_t camera_time_ns) {
   } else if (aids_) {
     aid = aids_->at(camera_time_ns);
   }
-  if (ptz_) aid.angles = ptz_->angles_at(camera_time_ns);
+  if (ptz_) {
+    aid.angles = ptz_->angles_at(camera_time_ns);
+    aid.zoom = ptz_->zoom();
+  }
   return aid;
 }
 

@@ -12,13 +12,26 @@ namespace {
 // What follows "flight:", "sim:".
 std::string rest_of(const std::string& source) { return source.substr(source.find(':') + 1); }
 
+// The lens at the zoom that the run is at; of a replay only its size counts, as each frame has its own.
+CameraModel zoomed_camera(const LiveConfig& config) {
+  const ZoomTable& table = *config.run.zoom_table;
+  if (config.ptz) {
+    const auto camera = table.at(config.ptz->zoom);
+    if (camera) return *camera;
+    throw ConfigError("ptz.zoom: expected one that camera.zoom_table was calibrated for, found " +
+                      std::to_string(config.ptz->zoom));
+  }
+  if (config.nav != NavSource::kFlight) {
+    throw ConfigError(
+        "camera.zoom_table: expected ptz.device or camera.model, as nothing else tells the zoom");
+  }
+  return table.entries().front().model;
+}
+
 }  // namespace
 
 OpenedSource open_source_of(const LiveConfig& config) {
   const RunConfig& run = config.run;
-  if (run.zoom_table) {
-    throw ConfigError("camera.zoom_table: expected camera.model, as nothing tells a live run the zoom");
-  }
   std::unique_ptr<LiveSource> pictures;
   std::optional<CameraModel> camera;
   std::optional<Rigid3> body_from_camera;
@@ -34,6 +47,7 @@ OpenedSource open_source_of(const LiveConfig& config) {
     pictures = std::move(simulation);
   }
   if (!run.camera_model.empty()) camera = read_camera_model(run.camera_model);
+  if (run.zoom_table) camera = zoomed_camera(config);
   if (!camera) {
     throw ConfigError("camera.model: expected the camera's model, as camera.source does not tell it");
   }

@@ -15,6 +15,13 @@ namespace {
 
 const std::string kConfigs = std::string(PERCH_SOURCE_DIR) + "/configs";
 
+std::string pinhole(double f) {
+  const std::string focal = std::to_string(f);
+  return "{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [" + focal + ", " + focal +
+         ", 159.5, 119.5], 'imagersize': [320, 240], 'extrinsics': [0, 0, 0, 0, 0, 0]}\n";
+}
+
+// Its lens is that of the zoom that the camera says it has: of the table's the widest.
 TEST(LivePtz, FollowsThePadThroughASimulatedHead) {
   const TempFolder folder;
   const std::string terminal = folder / "evi", port = std::to_string(free_udp_port());
@@ -30,11 +37,16 @@ TEST(LivePtz, FollowsThePadThroughASimulatedHead) {
                    port +
                    "\nflight: {start_height: 5, start_aside: 1, duration: 4, hover: 0.5, "
                    "touchdown_height: 2.5, gust_attitude_deg: 2}\n");
-  folder.write("live.yaml", "target: " + kConfigs +
-                                "/targets/sharp.yaml\ncamera: {source: \"sim:sim.yaml\"}\n"
-                                "frames: {base_from_camera: {pan_tilt: {}}}\n"
-                                "ptz: {device: \"visca+serial:" +
-                                terminal + ":9600\"}\n");
+  folder.write("wide.cameramodel", pinhole(352.7));
+  folder.write("tele.cameramodel", pinhole(900));
+  folder.write("zoom.yaml",
+               "models: [{zoom: 0, model: wide.cameramodel}, {zoom: 1, model: tele.cameramodel}]\n");
+  folder.write("live.yaml",
+               "target: " + kConfigs +
+                   "/targets/sharp.yaml\ncamera: {source: \"sim:sim.yaml\", zoom_table: zoom.yaml}\n"
+                   "frames: {base_from_camera: {pan_tilt: {}}}\n"
+                   "ptz: {device: \"visca+serial:" +
+                   terminal + ":9600\"}\n");
   const std::filesystem::path summary = folder / "summary.json";
   TempFolder live_folder;
   ChildProgram live(live_folder, PERCH_LIVE, {"--config", folder / "live.yaml", "--summary", summary});
@@ -57,6 +69,29 @@ TEST(LivePtz, AHeadNeedsTheFrameThatTurns) {
   ChildProgram live(live_folder, PERCH_LIVE, {"--config", folder / "live.yaml"});
   EXPECT_EQ(live.wait(20), 2);
   EXPECT_TRUE(live.says("base_from_camera: expected pan_tilt", 1)) << live.err();
+}
+
+TEST(LivePtz, AZoomTableNeedsSomebodyWhoTellsTheZoom) {
+  const TempFolder folder;
+  folder.write("wide.cameramodel", pinhole(300));
+  folder.write("tele.cameramodel", pinhole(900));
+  folder.write("zoom.yaml",
+               "models: [{zoom: 0.1, model: wide.cameramodel}, {zoom: 1, model: tele.cameramodel}]\n");
+  const std::string target = "target: " + kConfigs + "/targets/sharp.yaml\n";
+  const std::string camera =
+      "camera: {source: \"sim:" + kConfigs + "/simulation/landing.yaml\", zoom_table: zoom.yaml}\n";
+  folder.write("nobody.yaml", target + camera);
+  // Nobody has calibrated it at the widest zoom, to which `ptz` sends it where nothing is said.
+  folder.write("beyond.yaml", target + camera +
+                                  "frames: {base_from_camera: {pan_tilt: {}}}\n"
+                                  "ptz: {device: \"visca+tcp://127.0.0.1:1\"}\n");
+  for (const auto& [config, message] : {std::pair("nobody.yaml", "camera.zoom_table: expected ptz.device"),
+                                        {"beyond.yaml", "ptz.zoom: expected one that"}}) {
+    TempFolder live_folder;
+    ChildProgram live(live_folder, PERCH_LIVE, {"--config", folder / config});
+    EXPECT_EQ(live.wait(20), 2) << config;
+    EXPECT_TRUE(live.says(message, 1)) << live.err();
+  }
 }
 
 }  // namespace

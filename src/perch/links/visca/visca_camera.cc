@@ -189,6 +189,8 @@ void ViscaCamera::take_zoom(std::span<const uint8_t> payload) {
   const bool agrees = zoom_suspect_ && std::abs(*zoom_suspect_ - zoom) < kZoomAgrees;
   zoom_suspect_ = zoom;
   if (agrees) zoom_ = zoom;
+  // Somebody zooms, or the line garbled: nobody knows until two agree again, a tenth of a second.
+  if (zoom_ && std::abs(*zoom_ - zoom) >= kZoomAgrees) zoom_.reset();
 }
 
 void ViscaCamera::handle_ack(const Reply& reply, int64_t arrival_ns) {
