@@ -159,6 +159,7 @@ FlightScore score_flight(const FlightResult& result) {
   score.bins = bin_by_distance(compared);
   score.truth = score_truth(score.frames);
   score.consistency = check_consistency(score.frames, score.truth.has_value(), result.flight.nav_is_truth);
+  score.attribution = attribute_errors(result.estimates, result.chain, result.flight);
   score.reprojection_px = statistics(reprojection_px);
   score.detections = count_detections(score.frames);
   score.costs = measure_stage_costs(result.estimates);

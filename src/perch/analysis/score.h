@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "perch/analysis/attribution.h"
 #include "perch/analysis/detections.h"
 #include "perch/analysis/frame_record.h"
 #include "perch/analysis/stage_costs.h"
@@ -75,6 +76,7 @@ struct FlightScore {
   std::vector<DistanceBin> bins;
   std::optional<TruthScore> truth;
   Consistency consistency;
+  Attribution attribution;
 
   Statistics reprojection_px;
   Detections detections;

@@ -90,6 +90,25 @@ Json truth_json(const std::optional<TruthScore>& truth) {
           {"position_over_range_rms", number(truth->relative_position_rms)}};
 }
 
+Json attribution_json(const Attribution& a) {
+  if (a.count == 0) return nullptr;
+  Json causes = Json::array();
+  for (const ErrorCause& cause : a.causes) {
+    causes.push_back({{"cause", cause.cause},
+                      {"unit", cause.unit},
+                      {"value", cause.value},
+                      {"sigma", cause.sigma},
+                      {"alone_explains", number(cause.alone)},
+                      {"only_it_explains", number(cause.only_by_this)}});
+  }
+  return {{"frames", a.count},
+          {"position_rms_m", number(a.position_rms)},
+          {"position_noise_rms_m", number(a.position_noise)},
+          {"rotation_rms_rad", number(a.rotation_rms)},
+          {"rotation_noise_rms_rad", number(a.rotation_noise)},
+          {"causes", causes}};
+}
+
 Json stages_json(const StageCosts& costs) {
   Json json = Json::array();
   for (const StageCost& cost : costs.stages) {
@@ -139,6 +158,7 @@ nlohmann::ordered_json summary_json(const FlightScore& score) {
           {"distance_bins", bins_json(score.bins)},
           {"truth", truth_json(score.truth)},
           {"consistency", consistency_json(score.consistency)},
+          {"attribution", attribution_json(score.attribution)},
           {"reprojection_rms_px", size_json(score.reprojection_px)},
           {"stages", stages_json(score.costs)},
           {"total_us", size_json(score.costs.total_us)},

@@ -190,6 +190,18 @@ function detectionTimeline(flight, group) {
           [`${g.start_s.toFixed(3)} s`, String(g.first_frame), String(g.frames), `${g.duration_s.toFixed(3)} s`, reasons(g)]), {class: 'reasons'}) : null);
 }
 
+const CAUSE_UNITS = {rad: [DEG, '°'], m: [100, ' cm'], s: [1000, ' ms'], '': [100, ' %']};
+
+function attributionTable({attribution: a}) {
+  const values = (cause) => cause.value.map((value, i) => {
+    const [scale, unit] = CAUSE_UNITS[cause.unit];
+    return `${signed(scale * value)} ± ${short(scale * cause.sigma[i])}${unit}`;
+  }).join(', ');
+  return section('What would explain the errors', `Of ${cm(a.position_rms_m)} and ${deg(a.rotation_rms_rad)} RMS, the six constant mistakes below together explain all but ${cm(a.position_noise_rms_m)} and ${deg(a.rotation_noise_rms_rad)}: noise, drift, or what is not among them. Fitted to vision minus navigation; the value is what the configuration lacks, mount and lever arm in the axes of the body, the pad's in its own. Where "alone" is large and "only by it" small, another cause would do as well; perch-calibrate-mount tells such apart.`,
+      table(['cause', 'lacks', 'alone explains', 'only by it'], a.causes.map((cause) =>
+          [cause.cause, values(cause), percent(cause.alone_explains), percent(cause.only_it_explains)])));
+}
+
 function consistencyPlot(flight, group) {
   const {summary, frames} = flight;
   const c = summary.consistency;
@@ -255,6 +267,7 @@ function flightPage(flight, index) {
       tiles(summary));
   if (frames.time_s.length) page.append(statePlots(flight, group), flightScene(flight), detectionTimeline(flight, group));
   if (compared) page.append(rmsBars(summary), errorTable(summary), residualPlots(flight, group), distances(flight));
+  if (summary.attribution) page.append(attributionTable(summary));
   if (summary.consistency.mean_nees != null) page.append(consistencyPlot(flight, group));
   if (summary.stages.length) page.append(stageTable(summary));
   if (pictures.length) page.append(pictureStrip(pictures, compared));
