@@ -1,6 +1,6 @@
 // Bundles the pages with esbuild:
 //   node build.js station assets.cc   the ground station's files, compressed, as a C++ table (perch/station/assets.h)
-//   node build.js report FOLDER       report.js and report.css, which the report carries in it
+//   node build.js report FOLDER       report.js and mount.js, which the reports carry in them, and report.css
 import {createHash} from 'node:crypto';
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
 import {dirname, join} from 'node:path';
@@ -49,7 +49,7 @@ const [page, output] = process.argv.slice(2);
 if (page === 'station') {
   writeFileSync(output, table(await stationFiles()));
 } else if (page === 'report') {
-  const {outputFiles} = await build({...common, entryPoints: [join(source, 'report/report.js'), join(source, 'report/report.css')], outdir: output, format: 'iife'});
+  const {outputFiles} = await build({...common, entryPoints: ['report.js', 'mount.js', 'report.css'].map((name) => join(source, 'report', name)), outdir: output, format: 'iife'});
   mkdirSync(output, {recursive: true});
   for (const file of outputFiles) writeFileSync(file.path, file.contents);
 } else {

@@ -42,16 +42,6 @@ Eigen::MatrixXd eliminated(const Sparse& J, Eigen::Index n) {
   return 0.5 * (Hgg + Hgg.transpose());
 }
 
-// The inverse, with variances that show where there is nothing to invert.
-Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& information) {
-  Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * information *
-                                                             scale.asDiagonal());
-  const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(1e-13);
-  return scale.asDiagonal() * eigen.eigenvectors() * values.cwiseInverse().asDiagonal() *
-         eigen.eigenvectors().transpose() * scale.asDiagonal();
-}
-
 std::vector<std::string> names_of(const MountProblem& problem, const MountState& state) {
   std::vector<std::string> names;
   const auto add_pose = [&](const std::string& of, const std::string& rotation) {
@@ -71,6 +61,15 @@ std::vector<std::string> names_of(const MountProblem& problem, const MountState&
 }
 
 }  // namespace
+
+Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& information) {
+  Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * information *
+                                                             scale.asDiagonal());
+  const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(1e-13);
+  return scale.asDiagonal() * eigen.eigenvectors() * values.cwiseInverse().asDiagonal() *
+         eigen.eigenvectors().transpose() * scale.asDiagonal();
+}
 
 void check_converged(ceres::Problem& least_squares, const std::string& on, double limit) {
   ceres::Problem::EvaluateOptions options;

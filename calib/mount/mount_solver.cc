@@ -98,7 +98,7 @@ MountState configured(const MountProblem& problem, const std::vector<FlightStart
     state.offsets.push_back(problem.nominal_offset);
     const auto pairs =
         hand_eye_pairs(problem, problem.flights[f], starts[f].trajectory, problem.nominal_offset, 300);
-    state.pads.push_back(pad_of(pairs, problem.nominal_mount));
+    state.pads.push_back(problem.nominal_pad.value_or(pad_of(pairs, problem.nominal_mount)));
   }
   return state;
 }

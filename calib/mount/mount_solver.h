@@ -8,8 +8,9 @@ namespace perch {
 
 struct MountProblem {
   MountChain chain;
-  Rigid3 nominal_mount;       // where the drawing, or T_BS, says the camera is
-  double nominal_offset = 0;  // s
+  Rigid3 nominal_mount;               // where the drawing, or T_BS, says the camera is
+  double nominal_offset = 0;          // s
+  std::optional<Rigid3> nominal_pad;  // where the pad was surveyed; nothing is fitted to it
   std::vector<MountFlight> flights;
   MountOptions options;
 };
@@ -31,7 +32,7 @@ struct OffsetCost {
 
 struct MountSolution {
   MountState state;
-  MountState start;  // as configured, pads where it puts them
+  MountState start;  // as configured; pads that are not, where that puts them
   std::vector<FlightFit> flights;
   std::vector<OffsetCost> offset_costs;  // of the first flight, with everything else refitted by hand-eye
   // Of mount (d, r), pads (d, r), offsets, head: everything else eliminated, without the priors in it.

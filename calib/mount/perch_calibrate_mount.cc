@@ -9,8 +9,11 @@
 #include <fstream>
 #include <iostream>
 
+#include "calib/mount/cross_validation.h"
 #include "calib/mount/mount_files.h"
+#include "calib/mount/mount_report.h"
 #include "calib/mount/read_mount.h"
+#include "perch/analysis/pad_json.h"
 #include "perch/config/atomic_file.h"
 #include "perch/geometry/euler.h"
 #include "program.h"
@@ -19,6 +22,7 @@ DEFINE_string(config, "",
               "the run's configuration, a YAML file; its calibrate_mount section holds priors and noise");
 DEFINE_string(output, "", "the file that the mount is written to: a frames section for perch-batch");
 DEFINE_string(json, "", "also writes everything that was found, with the covariance, as JSON");
+DEFINE_string(report, "", "also writes a page with plots of everything that was found, one HTML file");
 DEFINE_string(pad, "per-flight", "per-flight: each flight over its own pad; shared: all over one");
 DEFINE_string(offset, "per-flight", "per-flight: each flight has its own clock offset; shared: one for all");
 DEFINE_string(set, "", "key.path=value: overrides the configuration; may be given several times");
@@ -36,7 +40,7 @@ bool is_shared(const std::string& flag, const std::string& value) {
   throw UsageError("--" + flag + ": expected per-flight or shared, found \"" + value + '"');
 }
 
-void print_result(const MountProblem& problem, const MountSolution& s) {
+void print_result(const MountProblem& problem, const MountSolution& s, const std::vector<HeldOut>& held) {
   const Eigen::VectorXd sigma = s.covariance.diagonal().cwiseSqrt();
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {
     const std::string& name = s.names[static_cast<size_t>(i)];
@@ -57,6 +61,28 @@ void print_result(const MountProblem& problem, const MountSolution& s) {
     std::printf("  %s: %td of %zu pictures, offset %.2f ms, chi-square %.2f a degree of freedom\n",
                 problem.flights[f].name.c_str(), std::count(used.begin(), used.end(), true), used.size(),
                 1000 * s.state.offsets[offset_of_flight(s.state, f)], s.chi_square / s.degrees);
+    const PadScatter before = pad_scatter(problem, s, f, s.start),
+                     after = pad_scatter(problem, s, f, s.state);
+    const PadScatter all = whole_scatter(problem, s, f);
+    std::printf(
+        "    the pad as these pictures place it scatters by %.2f mm, %.3f deg RMS, as all %zu do by %.2f mm, "
+        "%.3f deg "
+        "(with the mount of the start: %.1f mm, %.2f deg)\n",
+        1000 * after.position, kDegFromRad * after.rotation, all.count, 1000 * all.position,
+        kDegFromRad * all.rotation, 1000 * before.position, kDegFromRad * before.rotation);
+  }
+  for (const HeldOut& part : held) {
+    if (!part.problem.empty()) {
+      std::printf("  without a third of the pictures: %s\n", part.problem.c_str());
+      continue;
+    }
+    std::printf("  without a third of the pictures the mount is %.2f mm, %.3f deg away (%.1f sigma)",
+                1000 * part.moved, kDegFromRad * part.turned, part.moved_sigmas);
+    for (const PadScatter& p : part.beyond) {
+      std::printf("; that third places the pad to %.2f mm, %.3f deg", 1000 * p.position,
+                  kDegFromRad * p.rotation);
+    }
+    std::printf("\n");
   }
 }
 
@@ -98,21 +124,28 @@ int run(const CommandLine& line) {
   problem.chain = mount_chain(frames);
   problem.nominal_mount = nominal_mount(frames);
   problem.nominal_offset = frames.time_offset;
+  problem.nominal_pad = frames.world_from_pad;
   const MountSolution solution =
       solve_mount(problem, [](const std::string& text) { std::cerr << text << '\n'; });
-  print_result(problem, solution);
+  const std::vector<HeldOut> held = cross_validate(problem, solution);
+  print_result(problem, solution, held);
   const auto not_told = untold(solution, options);
   for (const Untold& u : not_told) std::cerr << "perch-calibrate-mount: " << in_words(u) << '\n';
   const FrameChain chain = calibrated_chain(frames, problem, solution);
   if (!FLAGS_json.empty()) {
     write_whole_file(FLAGS_json, mount_json(chain, problem, solution).dump(1) + "\n");
   }
+  const std::string yaml = mount_yaml(chain, problem, solution);
+  if (!FLAGS_report.empty()) {
+    write_whole_file(FLAGS_report, mount_report_html(problem, solution, held, yaml,
+                                                     pad_json(config.target, problem.chain.pad_from_target)));
+  }
   if (!not_told.empty()) {
     throw std::runtime_error(FLAGS_output +
                              " is not written: the flights do not tell the above; what is known "
                              "from elsewhere goes into calibrate_mount.prior, with its deviations");
   }
-  write_whole_file(FLAGS_output, mount_yaml(chain, problem, solution));
+  write_whole_file(FLAGS_output, yaml);
   std::cout << "mount: " << FLAGS_output << '\n';
   return 0;
 }

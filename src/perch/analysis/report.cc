@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "perch/analysis/page.h"
 #include "perch/analysis/page_assets.h"
 #include "perch/analysis/summary.h"
 #include "perch/geometry/euler.h"
@@ -132,37 +133,12 @@ Json pictures_json(const ReportFlight& flight) {
   return pictures;
 }
 
-// JSON within <script>: no "</script>" and no "<!--" can be in it without a '<'.
-std::string for_script(const Json& json) {
-  std::string safe;
-  for (const char c : to_text(json)) {
-    if (c == '<') {
-      safe += "\\u003c";
-    } else {
-      safe += c;
-    }
-  }
-  return safe;
-}
-
-// The browser itself is told that the page may load nothing.
-constexpr std::string_view kHead = R"(<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>Perch flight report</title>
-<link rel="icon" href="data:,">
-)";
-
 constexpr std::string_view kFlightBegin = "<script class=\"flight\" type=\"application/json\">",
                            kScriptEnd = "</script>\n";
 
 std::string page_html(const Json& season, std::span<const std::string> flights,
                       const std::string& configuration) {
-  std::string html(kHead);
+  std::string html = page_head("Perch flight report");
   const auto add = [&html](std::initializer_list<std::string_view> parts) {
     for (const std::string_view part : parts) html += part;
   };
@@ -170,8 +146,8 @@ std::string page_html(const Json& season, std::span<const std::string> flights,
   add(
       {"<noscript>This report draws its plots with JavaScript; the same numbers are in "
        "summary.json.</noscript>\n"});
-  add({"<script id=\"configuration\" type=\"application/json\">", for_script(configuration), kScriptEnd});
-  add({"<script id=\"season\" type=\"application/json\">", for_script(season), kScriptEnd});
+  add({"<script id=\"configuration\" type=\"application/json\">", script_json(configuration), kScriptEnd});
+  add({"<script id=\"season\" type=\"application/json\">", script_json(season), kScriptEnd});
   // A script tag a flight: one flight's JSON tree at a time is in memory, here and in the browser.
   for (const std::string& flight : flights) add({kFlightBegin, flight, kScriptEnd});
   add({"<script>\n", kReportJs, kScriptEnd});
@@ -182,7 +158,7 @@ std::string page_html(const Json& season, std::span<const std::string> flights,
 }  // namespace
 
 std::string flight_data(const ReportFlight& flight) {
-  return for_script({{"summary", summary_json(flight.score)},
+  return script_json(Json{{"summary", summary_json(flight.score)},
                      {"frames", frames_json(flight.score)},
                      {"pictures", pictures_json(flight)},
                      {"pad", flight.pad}});

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Dense>
+#include <chrono>
 #include <cstdlib>
 
+#include "calib/mount/cross_validation.h"
 #include "mount_world.h"
 #include "support/near_pose.h"
 
@@ -30,11 +32,11 @@ std::string error_of(const MountProblem& problem) {
   return "";
 }
 
-// The flight: a mount 10 deg and 20 cm off, 40 ms, 2 cm and 0.3 deg of noise at 100 Hz, 60 s. Few
-// seeds always, 100 with PERCH_MOUNT_SEEDS=100.
+// The flight: a mount 10 deg and 20 cm off, 40 ms, 2 cm and 0.3 deg of noise at 100 Hz, 60 s. One
+// seed always, 100 with PERCH_MOUNT_SEEDS=100.
 TEST(MountSolver, FindsTheMountWithinItsDeviationsOnEverySeed) {
   const char* asked = std::getenv("PERCH_MOUNT_SEEDS");
-  const int seeds = asked ? std::atoi(asked) : 3;
+  const int seeds = asked ? std::atoi(asked) : 1;
   int outside = 0, total = 0;
   double nees = 0;
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(13);
@@ -66,13 +68,32 @@ TEST(MountSolver, FindsTheMountWithinItsDeviationsOnEverySeed) {
   }
 }
 
+// Five minutes at 30 Hz: minutes under a sanitizer, so only when it is asked for.
+TEST(MountSolver, IsQuickOnALongFlight) {
+  if (!std::getenv("PERCH_MOUNT_LONG")) GTEST_SKIP() << "set PERCH_MOUNT_LONG";
+  TestRng rng;
+  MountWorld world;
+  world.duration = 300;
+  world.camera_rate = 30;
+  const MountProblem p = world.problem(rng);
+  const auto start = std::chrono::steady_clock::now();
+  const MountSolution s = solve_mount(p);
+  const std::chrono::duration<double> solved = std::chrono::steady_clock::now() - start;
+  cross_validate(p, s);
+  const std::chrono::duration<double> all = std::chrono::steady_clock::now() - start;
+  std::cout << p.flights[0].sightings.size() << " pictures: solved in " << solved.count()
+            << " s, cross-validated after " << all.count() << " s\n";
+  EXPECT_LT(all.count(), 60);
+}
+
 TEST(MountSolver, AThirdOfWrongPosesDoesNoHarm) {
   TestRng rng;
   MountWorld world;
   world.wrong_poses = 0.3;
+  world.camera_rate = 5;  // deviations 1.7 times those at 15 Hz
   const MountSolution s = solve_mount(world.problem(rng));
-  EXPECT_THAT(s.state.mount, IsNearPose(world.body_from_base, 0.1 * kRadFromDeg, 0.01));
-  EXPECT_NEAR(s.state.offsets[0], world.time_offset, 0.001);
+  EXPECT_THAT(s.state.mount, IsNearPose(world.body_from_base, 0.2 * kRadFromDeg, 0.02));
+  EXPECT_NEAR(s.state.offsets[0], world.time_offset, 0.002);
 }
 
 // Slow errors of GPS and heading: taken for white noise they would make the deviations four times too small.
@@ -85,6 +106,7 @@ TEST(MountSolver, KnowsDriftForWhatItIs) {
     world.position_drift = 0.05;
     world.rotation_drift = 0.3 * kRadFromDeg;
     world.drift_time = 5;
+    world.camera_rate = 4;
     const MountSolution s = solve_mount(world.problem(rng));
     const Eigen::VectorXd e = errors_of(s, world).head<6>();
     nees += e.dot(s.covariance.topLeftCorner<6, 6>().ldlt().solve(e)) / 6 / kSeeds;
@@ -98,6 +120,7 @@ TEST(MountSolver, SaysWhatIsWrongWithTheNavigation) {
     TestRng rng;
     MountWorld world;
     world.duration = 30;
+    world.camera_rate = 5;
     MountProblem p = world.problem(rng);
     for (NavSample& s : p.flights[0].nav.samples) change(s);
     return error_of(p);

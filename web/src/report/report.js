@@ -6,6 +6,7 @@ import {theme} from '../common/theme.js';
 import {TimeGroup, gapsOf, line, scatterPlot, shadeGaps, statusStrip, timePlot} from '../views/plots.js';
 import {StatePlots} from '../views/state_plots.js';
 import {Scene} from '../views/scene.js';
+import {redrawWhenColoursChange, section, table, tileRow} from './parts.js';
 import {seasonPage} from './season.js';
 
 const shownScale = (i) => (isAngle(i) ? DEG : 100);  // rad to degrees, m to cm
@@ -22,18 +23,6 @@ const cm = (metres) => (metres == null ? '–' : short(100 * metres) + ' cm');
 const deg = (rad) => (rad == null ? '–' : short(DEG * rad) + '°');
 const ms = (us) => (us == null ? '–' : short(us / 1000) + ' ms');
 const plural = (count, word) => `${count} ${word}${count === 1 ? '' : 's'}`;
-
-function section(title, note, ...children) {
-  return element('section', {}, element('h3', {}, title), note ? element('p', {class: 'note'}, note) : null, ...children);
-}
-
-// Numbers right, first column left; `rows` of strings or elements.
-function table(header, rows, attributes = {}) {
-  return element('div', {class: 'scroll'}, element('table', attributes,
-      element('thead', {}, element('tr', {}, ...header.map((h) => element('th', {scope: 'col'}, h)))),
-      element('tbody', {}, ...rows.map((row) => element('tr', {}, ...row.map((cell, i) =>
-          element(i ? 'td' : 'th', i ? {} : {scope: 'row'}, cell)))))));
-}
 
 // ---- the words and figures at the top ----
 
@@ -69,8 +58,7 @@ function tiles(summary) {
     ['reprojection', summary.reprojection_rms_px.rms == null ? null : short(summary.reprojection_rms_px.rms) + ' px', 'RMS'],
     ['time a frame', summary.total_us.mean == null ? null : ms(summary.total_us.mean), `99 % ≤ ${ms(summary.total_us.p99)}`],
   ];
-  return element('dl', {class: 'tiles'}, ...all.filter((tile) => tile[1]).map(([name, value, note]) =>
-      element('div', {}, element('dt', {}, name), element('dd', {}, value), element('small', {}, note))));
+  return tileRow(all.filter((tile) => tile[1]));
 }
 
 const WHY_NOT_COMPARED = {
@@ -313,10 +301,7 @@ function main() {
   };
   const wanted = parseInt(location.hash.slice(1), 10);
   draw(wanted >= 0 && wanted < parsed.length ? wanted : 0);
-  // Plots have their colours painted in: a new scheme needs new plots. Paper is always white.
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => draw(shown));
-  addEventListener('beforeprint', () => { document.documentElement.classList.add('paper-page'); draw(shown); });
-  addEventListener('afterprint', () => { document.documentElement.classList.remove('paper-page'); draw(shown); });
+  redrawWhenColoursChange(() => draw(shown));
 }
 
 main();

@@ -2,7 +2,7 @@
 // pad's z axis is up on the screen. Drag to turn, wheel or pinch to zoom.
 import {
   AxesHelper, BufferAttribute, BufferGeometry, CylinderGeometry, DoubleSide, GridHelper, Group, Line, LineBasicMaterial, LineSegments,
-  Mesh, MeshBasicMaterial, PerspectiveCamera, Quaternion, Scene as World, Vector3, WebGLRenderer,
+  Mesh, MeshBasicMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Scene as World, Vector3, WebGLRenderer,
 } from 'three';
 import {theme} from '../common/theme.js';
 import {element} from '../common/element.js';
@@ -33,6 +33,7 @@ export class Scene {
     this.vehicle = vehicle();
     this.cone = new LineSegments(new BufferGeometry(), new LineBasicMaterial());
     this.trail = new Line(new BufferGeometry(), new LineBasicMaterial());
+    this.points = new Points(new BufferGeometry(), new PointsMaterial({size: 3, sizeAttenuation: false}));
     try {
       this.renderer = new WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
     } catch {
@@ -41,8 +42,8 @@ export class Scene {
     }
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.element.append(this.renderer.domElement);
-    this.trail.frustumCulled = this.cone.frustumCulled = false;
-    this.world.add(this.vehicle, this.cone, this.trail);
+    this.trail.frustumCulled = this.cone.frustumCulled = this.points.frustumCulled = false;
+    this.world.add(this.vehicle, this.cone, this.trail, this.points);
     this.listen();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.element);
@@ -89,7 +90,8 @@ export class Scene {
 
   recolour() {
     if (!this.renderer) return;
-    /** @type {any} */ (this.trail.material).color.set(theme('vision'));
+    /** @type {any} */ (this.trail.material).color.set(theme(this.overlaid ? 'navigation' : 'vision'));
+    /** @type {any} */ (this.points.material).color.set(theme('vision'));
     /** @type {any} */ (this.cone.material).color.set(theme('navigation'));
     for (const part of this.vehicle.children) /** @type {any} */ (part).material.color.set(theme(part.userData.nose ? 'vision' : 'text'));
     this.grid?.material.color.set(theme('muted'));
@@ -113,6 +115,23 @@ export class Scene {
     }
     if (this.cone.visible && frame?.camera && rays) replace(this.cone, coneLines(place(frame.camera), rays, Math.abs(frame.camera[2])));
     this.draw();
+  }
+
+  // Instead of show(): two paths in the pad frame over each other, one as a line, one as points, all of both in sight.
+  overlay(navigation, vision) {
+    if (!this.renderer) return;
+    this.overlaid = true;
+    this.vehicle.visible = this.cone.visible = false;
+    // The line is a pixel wide: over the points, it can be seen.
+    this.trail.renderOrder = 1;
+    /** @type {any} */ (this.trail.material).depthTest = false;
+    replace(this.trail, navigation.flat());
+    replace(this.points, vision.flat());
+    const all = [...navigation, ...vision, [0, 0, 0]];
+    const low = [0, 1, 2].map((k) => Math.min(...all.map((p) => p[k]))), high = [0, 1, 2].map((k) => Math.max(...all.map((p) => p[k])));
+    this.turn.centre.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+    this.reach = 0.75 * Math.hypot(...[0, 1, 2].map((k) => high[k] - low[k]));
+    this.recolour();
   }
 
   draw() {

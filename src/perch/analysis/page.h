@@ -1,0 +1,17 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace perch {
+
+// What the pages of a run and of a calibration have in common: each one file that opens offline.
+
+// From the first line to the page's icon, within <head>. `title` is text of ours. The browser itself is told
+// that the page may load nothing.
+std::string page_head(const std::string& title);
+
+// JSON for within a <script>: no text in it can end that.
+std::string script_json(const nlohmann::ordered_json& json);
+
+}  // namespace perch
