@@ -48,6 +48,8 @@ Rigid3 middle_of(const std::vector<Rigid3>& places) {
 HeldOut without(const MountProblem& problem, const MountSolution& solution, size_t part) {
   HeldOut result;
   MountProblem rest = problem;
+  // What fewer pictures would say of navigation's noise is another matter.
+  if (solution.flights.size() == 1) rest.options.noise = solution.flights[0].noise;
   std::vector<std::vector<bool>> within(problem.flights.size()), beyond(problem.flights.size());
   for (size_t f = 0; f < problem.flights.size(); ++f) {
     const MountFlight& flight = problem.flights[f];

@@ -159,6 +159,29 @@ void choose(MountProblem& problem, MountSolution& solution) {
   }
 }
 
+// Measured noise that leaves a chi-square above 1 a degree of freedom is too small: of few pictures its
+// median scatters, and what no model has is in it as well. Taken as it is, it would throw out good pictures
+// and state deviations that are too small. Three rounds at most: what they do not mend is no noise.
+void raise_noise(MountProblem& problem, MountSolution& solution) {
+  constexpr double kTooLarge = 1.1;  // 5 % of the deviations
+  const NavigationNoise& given = problem.options.noise;
+  const auto scale = [](double by, double given_value, double* value) {
+    if (!std::isfinite(given_value)) *value *= by;
+  };
+  for (int round = 0; round < 3 && solution.degrees > 0; ++round) {
+    const double ratio = solution.chi_square / solution.degrees;
+    if (!(ratio > kTooLarge)) return;
+    for (FlightFit& fit : solution.flights) {
+      scale(std::sqrt(ratio), given.position, &fit.noise.position);
+      scale(std::sqrt(ratio), given.rotation, &fit.noise.rotation);
+      scale(std::sqrt(ratio), given.position_drift, &fit.noise.position_drift);
+      scale(std::sqrt(ratio), given.rotation_drift, &fit.noise.rotation_drift);
+    }
+    fit_poses(problem, solution, true);
+    choose(problem, solution);
+  }
+}
+
 }  // namespace
 
 UnknownBlocks::UnknownBlocks(const MountState& state)
@@ -299,6 +322,7 @@ void pose_gate(MountProblem& problem, MountSolution& solution) {
     }
   }
   choose(problem, solution);
+  raise_noise(problem, solution);
 }
 
 }  // namespace perch
