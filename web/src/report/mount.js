@@ -74,7 +74,7 @@ function residualPlots(flight, key, draw) {
       const figure = six.appendChild(element('figure'));
       draw.push(() => timePlot(figure, group, {
         label: `${name} [${unitOf(i)}]`, height,
-        series: [line('navigation − vision', theme(colour), flight.time_s.length, {paths: () => null, points: {show: true, size: 3, fill: theme(colour), width: 0}})],
+        series: [line('navigation − vision', theme(colour), flight.time_s.length, {paths: () => null, points: {show: true, size: flight.time_s.length < 100 ? 6 : 3, fill: theme(colour), width: 0}})],
         data: [flight.time_s, errors[i]],
       }));
     });

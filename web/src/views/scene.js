@@ -127,6 +127,7 @@ export class Scene {
     /** @type {any} */ (this.trail.material).depthTest = false;
     replace(this.trail, navigation.flat());
     replace(this.points, vision.flat());
+    /** @type {any} */ (this.points.material).size = vision.length < 100 ? 8 : 4;
     const all = [...navigation, ...vision, [0, 0, 0]];
     const low = [0, 1, 2].map((k) => Math.min(...all.map((p) => p[k]))), high = [0, 1, 2].map((k) => Math.max(...all.map((p) => p[k])));
     this.turn.centre.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
