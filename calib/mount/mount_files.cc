@@ -147,6 +147,17 @@ Json mount_json(const FrameChain& chain, const MountProblem& problem, const Moun
                 {"quaternion_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
   };
   Json json = {{"body_from_base", pose(*chain.body_from_base)}};
+  if (chain.pan_tilt) {
+    const PanTilt& head = *chain.pan_tilt;
+    json["pan_tilt"] = {{"base_from_zero", pose(head.base_from_zero)}, {"latency_s", head.latency}};
+    for (const auto& [name, axis] : {std::pair{"pan", head.pan}, std::pair{"tilt", head.tilt}}) {
+      const Eigen::Vector3d &d = axis.direction, &p = axis.point;
+      json["pan_tilt"][name] = {{"direction", {d.x(), d.y(), d.z()}},
+                                {"point_m", {p.x(), p.y(), p.z()}},
+                                {"scale", axis.scale},
+                                {"zero_deg", kDegFromRad * axis.zero}};
+    }
+  }
   const Eigen::VectorXd sigma = sigmas(s);
   Json names = Json::array(), covariance = Json::array();
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {

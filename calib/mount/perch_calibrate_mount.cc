@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <set>
 
 #include "calib/mount/cross_validation.h"
 #include "calib/mount/mount_files.h"
@@ -97,6 +98,12 @@ int run(const CommandLine& line) {
   }
   if (FLAGS_output.empty()) throw UsageError("expected --output");
   if (line.arguments.empty()) throw UsageError("expected a flight");
+  // Twice the same pictures would tell as if they were twice as many.
+  std::set<std::filesystem::path> folders;
+  for (const std::string& folder : line.arguments) {
+    if (!folders.insert(std::filesystem::weakly_canonical(folder)).second)
+      throw UsageError(folder + ": the same flight twice");
+  }
   options.shared_pad = is_shared("pad", FLAGS_pad);
   options.shared_offset = is_shared("offset", FLAGS_offset);
   std::signal(SIGINT, request_stop);

@@ -149,6 +149,7 @@ TEST_F(PerchCalibrateMount, NamesWhatIsWrongWithTheCommandLineAndTheConfiguratio
   EXPECT_EQ(run("good").code, 2);
   EXPECT_EQ(run("--config run.yaml good").code, 2);
   EXPECT_EQ(run("--config run.yaml --output m.yaml --pad both good").code, 2);
+  EXPECT_THAT(run("--config run.yaml --output m.yaml good ./good/").err, HasSubstr("the same flight twice"));
   const Outcome unknown = run("--config run.yaml --output m.yaml --set calibrate_mount.lens=3 good");
   EXPECT_NE(unknown.code, 0);
   EXPECT_THAT(unknown.err, HasSubstr("calibrate_mount.lens"));
