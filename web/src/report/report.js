@@ -185,7 +185,7 @@ function attributionTable({attribution: a}) {
     const [scale, unit] = CAUSE_UNITS[cause.unit];
     return `${signed(scale * value)} ± ${short(scale * cause.sigma[i])}${unit}`;
   }).join(', ');
-  return section('What would explain the errors', `Of ${cm(a.position_rms_m)} and ${deg(a.rotation_rms_rad)} RMS, the six constant mistakes below together explain all but ${cm(a.position_noise_rms_m)} and ${deg(a.rotation_noise_rms_rad)}: noise, drift, or what is not among them. Fitted to vision minus navigation; the value is what the configuration lacks, mount and lever arm in the axes of the body, the pad's in its own. Where "alone" is large and "only by it" small, another cause would do as well; perch-calibrate-mount tells such apart.`,
+  return section('What would explain the errors', `Of ${cm(a.position_rms_m)} and ${deg(a.rotation_rms_rad)} RMS, the six constant mistakes below together explain all but ${cm(a.position_noise_rms_m)} and ${deg(a.rotation_noise_rms_rad)}: noise, drift, or what is not among them. Fitted to vision minus navigation; the value is what the configuration lacks, mount and lever arm in the axes of the body, the pad's in its own. Where "alone" is large and "only by it" small, another cause would do as well; perch-calibrate-mount tells such apart. The deviations take errors for independent from frame to frame: where navigation drifts they are too small.`,
       table(['cause', 'lacks', 'alone explains', 'only by it'], a.causes.map((cause) =>
           [cause.cause, values(cause), percent(cause.alone_explains), percent(cause.only_it_explains)])));
 }
