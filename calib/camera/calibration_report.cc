@@ -30,7 +30,7 @@ constexpr std::string_view kStyle = R"(
 .pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); gap: 1.2rem; }
 .pictures svg { display: block; }
 figcaption { font-size: .85rem; color: var(--muted); margin-bottom: .3rem; }
-.bad { color: var(--vision); font-weight: 600; }
+.scroll + h3 { margin-top: 1.6rem; }
 pre { overflow-x: auto; font-size: .85rem; }
 )";
 

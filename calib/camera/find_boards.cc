@@ -69,7 +69,7 @@ class Search {
   void leave_out_sizes();
   void leave_out_blurred();
   void show() const;
-  std::string what_else() const;
+  std::string what_else(const std::vector<LeftOut>& without) const;
 
   const Board& board_;
   const FindOptions& options_;
@@ -240,16 +240,16 @@ void Search::leave_out_blurred() {
 }
 
 // What the pictures show in place of the chessboard that was asked for.
-std::string Search::what_else() const {
+std::string Search::what_else(const std::vector<LeftOut>& without) const {
   if (!std::holds_alternative<Chessboard>(board_.pattern)) return {};
   int tried = 0;
-  for (const Looked& one : kept_) {
+  for (const LeftOut& one : without) {
     Frame frame;
-    read_picture(one.board.picture, Channel::kGrey, frame);
+    read_picture(one.picture, Channel::kGrey, frame);
     if (!frame.problem.empty() || ++tried > 5) continue;
     const cv::Size size = chessboard_in(frame.grey);
     if (size.width < 3) continue;
-    return "; " + one.board.picture + " shows one of " + size_text(size.width, size.height) +
+    return "; " + one.picture + " shows one of " + size_text(size.width, size.height) +
            " inner corners (a board has one less each way than squares)";
   }
   return {};
@@ -286,13 +286,19 @@ FoundBoards Search::result() {
     std::string reason = kept_.empty() ? ""
                                        : " (" + kept_.front().board.picture + ": " +
                                              kept_.front().board.sighting.problem + ")";
-    throw std::runtime_error(board_.text + ": not found, in " + pictures + reason + what_else());
+    std::vector<LeftOut> all;
+    for (const Looked& one : kept_) all.push_back({one.board.picture, one.board.sighting.problem});
+    throw std::runtime_error(board_.text + ": not found, in " + pictures + reason + what_else(all));
   }
   std::erase_if(kept_, [&](const Looked& one) {
     if (!one.board.sighting.corners.empty()) return false;
     result_.left_out.push_back({one.board.picture, one.board.sighting.problem});
     return true;
   });
+  if (kept_.size() < result_.left_out.size()) {
+    const std::string what = what_else(result_.left_out);
+    if (!what.empty()) result_.remarks.push_back(board_.text + ": not in most pictures" + what);
+  }
   leave_out_sizes();
   leave_out_blurred();
   if (!options_.show.empty()) show();

@@ -104,11 +104,16 @@ LensFit finish(MrcalProblem& problem, const FitOptions& options) {
 
 }  // namespace
 
-void check_views(const BoardViews& views, const std::string& lens) {
+void check_lens(const std::string& lens) {
   const mrcal_lensmodel_t model = mrcal_lens(lens);
   const mrcal_lensmodel_metadata_t metadata = mrcal_lensmodel_metadata(&model);
   if (!metadata.has_core || !metadata.has_gradients)
     throw CalibrationError(lens + ": mrcal can project with this lens model but not fit it");
+}
+
+void check_views(const BoardViews& views, const std::string& lens) {
+  check_lens(lens);
+  const mrcal_lensmodel_t model = mrcal_lens(lens);
   const auto& grid = views.grid;
   if (grid.columns < 2 || grid.rows < 2 || !(grid.spacing > 0) || !std::isfinite(grid.spacing))
     throw CalibrationError("the board: expected 2 x 2 corners at least and a spacing above 0");

@@ -58,6 +58,9 @@ struct FitOptions {
   uint32_t seed = 1;  // of the distortions' first values, +-1e-6
 };
 
+// Throws CalibrationError for a lens that mrcal does not know, or cannot fit.
+void check_lens(const std::string& lens);
+
 // Throws CalibrationError: no or too few views, views of which nothing can be solved (fewer than 6 corners,
 // all on a line), corners outside of the grid, twice or not finite, a lens that mrcal does not know.
 void check_views(const BoardViews& views, const std::string& lens);

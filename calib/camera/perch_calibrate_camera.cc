@@ -219,6 +219,11 @@ int run(const CommandLine& line) {
   CalibrationOptions options;
   if (!FLAGS_lens.empty()) options.lens_models = by_commas(FLAGS_lens);
   options.ranges = ranges_of(FLAGS_ranges);
+  try {
+    for (const std::string& lens : options.lens_models) check_lens(lens);
+  } catch (const CalibrationError& e) {
+    throw UsageError(std::string("--lens: ") + e.what());
+  }
   if (!FLAGS_require.empty()) {
     try {
       parse_requirements(FLAGS_require);

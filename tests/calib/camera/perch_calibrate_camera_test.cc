@@ -33,6 +33,7 @@ TEST(PerchCalibrateCamera, RefusesWhatItCannotDo) {
       {"--board 9x6 --spacing 0.02 --live sim:x.yaml a.png", "expected pictures, or --live"},
       {"--board 9x6 --spacing 0.02 --json s.json a.png", "--output"},
       {"--board 9x6 --spacing 0.02 --output o --require beauty=1 a.png", "beauty"},
+      {"--board 9x6 --spacing 0.02 --output o --lens LENSMODEL_FOO a.png", "--lens: LENSMODEL_FOO"},
       {"--target nowhere.yaml --output o a.png", "nowhere.yaml"},
   };
   for (const auto& [arguments, message] : wrong) {
