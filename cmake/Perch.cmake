@@ -20,10 +20,11 @@ option(PERCH_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
 
 # What every target of ours is compiled with. No contraction of a*b+c: x86 and ARM then round alike,
 # which bit-exact replay needs. -Wrestrict is wrong on "text" + std::string(...) in g++ 12 (GCC bug 105651), and
-# so is -Wstringop-overflow, which with precompiled headers is said of the standard library's own lines.
+# so are -Wstringop-overflow, -Wstringop-overread and -Warray-bounds, which with precompiled headers are said of the
+# standard library's own lines.
 function(perch_compile_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Werror -Wno-restrict
-                                           -Wno-stringop-overflow -ffp-contract=off)
+                                           -Wno-stringop-overflow -Wno-stringop-overread -Wno-array-bounds -ffp-contract=off)
   if(PERCH_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=address,undefined -fno-sanitize-recover=undefined
                                              -fno-omit-frame-pointer)
