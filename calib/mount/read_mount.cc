@@ -43,6 +43,11 @@ void read_sigma(Section& section, std::string_view key, double scale, double* va
 }
 
 CameraModel camera_of(const RunConfig& config, const Flight& flight) {
+  if (config.zoom_table) {
+    throw std::runtime_error(
+        "camera.zoom_table: expected camera.model for a mount calibration, that of the one zoom it was flown "
+        "at");
+  }
   if (!config.camera_model.empty()) return read_camera_model(config.camera_model);
   if (flight.camera) return *flight.camera;
   throw std::runtime_error(flight.folder.string() +

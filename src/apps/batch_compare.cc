@@ -97,10 +97,13 @@ ComparedFrames sum_of(const std::vector<ComparedFrames>& samples) {
 RunComparison compare_runs(const fs::path& a, const fs::path& b, std::span<const std::string> flights) {
   std::vector<std::vector<ComparedFrames>> compared;
   std::string tables, missing;
+  RunComparison comparison;
   for (const std::string& name : flights) {
     const auto ours = read_summary(b / name), theirs = read_summary(a / name);
     if (!ours || !theirs) {
-      missing += "  " + name + ": not in " + (ours ? "A" : "B") + "\n";
+      const bool lost = theirs.has_value();
+      missing += "  " + name + ": not in " + (ours ? "A" : theirs ? "B: worse" : "A, nor in B") + "\n";
+      comparison.worse = comparison.worse || lost;
       continue;
     }
     compared.push_back(compare_flight(a / name, b / name));
@@ -112,7 +115,6 @@ RunComparison compare_runs(const fs::path& a, const fs::path& b, std::span<const
     if (!few) samples.push_back(sum_of(flight));
     if (few) samples.insert(samples.end(), flight.begin(), flight.end());
   }
-  RunComparison comparison;
   comparison.text = "A: " + a.string() + ", B: " + b.string() + ", " + std::to_string(compared.size()) +
                     " flights, " + std::to_string(sum_of(samples).frames) + " frames; 95 % intervals by " +
                     (few ? "seconds, of these flights alone:\n" : "flights:\n");

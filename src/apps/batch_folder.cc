@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr char kComplete[] = "complete.json";
+constexpr char kComplete[] = "complete.json", kSummary[] = "summary.json";
 
 [[noreturn]] void fail(const fs::path& path) {
   throw std::runtime_error(path.string() + ": cannot be written: " + std::generic_category().message(errno));
@@ -92,7 +92,10 @@ void BatchFolder::finish(const std::string& flight, const BatchKey& key) const {
   if (!stream) fail(from / kComplete);
 
   fs::create_directories(to);
-  fs::remove(to / kComplete);  // files of two runs are no result
+  // Files of two runs are no result: who reads a flight asks for its summary.
+  fs::remove(to / kComplete);
+  fs::remove(to / kSummary);
+  std::stable_partition(names.begin(), names.end(), [](const std::string& name) { return name != kSummary; });
   for (const std::string& name : names) fs::rename(from / name, to / name);
   fs::rename(from / kComplete, to / kComplete);
   std::error_code ignored;
@@ -101,7 +104,11 @@ void BatchFolder::finish(const std::string& flight, const BatchKey& key) const {
 
 void BatchFolder::forget(const std::string& flight) const {
   std::error_code ignored;
-  fs::remove(of(flight) / kComplete, ignored);
+  // Other things may lie there that are not ours.
+  for (const char* name : {kComplete, kSummary, "estimates.csv", "states.csv", "errors.csv",
+                           "pad_from_body.tum", "report.html"}) {
+    fs::remove(of(flight) / name, ignored);
+  }
   fs::remove_all(own_ / flight, ignored);
 }
 

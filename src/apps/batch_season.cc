@@ -58,7 +58,7 @@ void write_season(const BatchFolder& folder, std::span<const SeasonFlight> fligh
                                   : flight_data_of_page(read(folder.of(flight.name) / "report.html")));
     bytes += data.back().size();
   }
-  if (bytes > kMostBytesInPage) data.clear();
+  if (bytes > kMostBytesInPage && flights.size() > 1) data.clear();
   database.commit();
   write_whole_file(folder.path() / "summary.csv", csv);
   write_whole_file(folder.path() / "report.html", season_html(season.json(), data, resolved_configuration));

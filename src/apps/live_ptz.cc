@@ -99,10 +99,9 @@ void LivePtz::turn() {
     head_.receive(chunk.bytes, chunk.arrival_ns, chunk.datagram);
   });
   const std::lock_guard lock(mutex_);
-  if (head_.ready() && !zoom_told_) {
-    head_.zoom_to(options_.zoom);
-    zoom_told_ = true;
-  }
+  // A device that began anew is told anew.
+  if (head_.ready() && !zoom_told_) head_.zoom_to(options_.zoom);
+  zoom_told_ = head_.ready();
   bool wrote = false;
   for (const visca::Bytes& packet : head_.tick(monotonic_ns())) wrote |= stream_.write(packet);
   if (wrote) stream_.wake();  // run() comes back at once, and has sent it

@@ -37,7 +37,8 @@ class LivePtz {
   ~LivePtz();  // stops the head, ends the thread
 
   std::optional<HeadAngles> angles_at(int64_t time_ns) const;
-  // As the camera tells it, once it is where it was told to go; empty before, and while somebody moves it.
+  // As the camera tells it, once it is where it was told to go; empty before, and while somebody moves it,
+  // but for the first 0.4 s.
   std::optional<double> zoom() const;
   // Where the vehicle is after a picture, and its attitude where that is known: the head follows.
   void report(const std::optional<VehicleState>& state,

@@ -15,6 +15,7 @@
 #include <map>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <sstream>
 #include <thread>
 
 #include "batch_compare.h"
@@ -187,6 +188,20 @@ void check(const RunConfig& config) {
   }
 }
 
+// What a zoom table's files came to: its path says nothing of them.
+std::string lenses_of(const RunConfig& config) {
+  std::ostringstream text;
+  text.precision(17);
+  if (!config.zoom_table) return "";
+  for (const ZoomEntry& entry : config.zoom_table->entries()) {
+    const CameraModel& model = entry.model;
+    text << '\n' << entry.zoom << ' ' << model.lens() << ' ' << model.width() << ' ' << model.height();
+    for (const double value : model.intrinsics()) text << ' ' << value;
+    text << ' ' << model.intrinsics_covariance();
+  }
+  return text.str();
+}
+
 // All that a flight's results depend on but the flight.
 BatchKey key_of(const RunConfig& config, Section root) {
   fs::path target;
@@ -194,7 +209,7 @@ BatchKey key_of(const RunConfig& config, Section root) {
   std::vector<fs::path> files = {target};
   if (!config.camera_model.empty()) files.push_back(config.camera_model);
   const std::string times = FLAGS_times ? "" : "\n--notimes";
-  return {program_digest(), configuration_digest(root.resolved() + times, files), {}};
+  return {program_digest(), configuration_digest(root.resolved() + lenses_of(config) + times, files), {}};
 }
 
 constexpr int kWorse = 3;  // exit code: all was done, and the comparison says that something became worse
@@ -225,7 +240,7 @@ int compare_only(const fs::path& a, const fs::path& b) {
 int report(const BatchFolder& folder, const std::vector<NamedFlight>& flights,
            const std::vector<Outcome>& outcomes, const Shard& shard, const std::string& resolved) {
   std::vector<SeasonFlight> season;
-  std::vector<std::string> estimated;
+  std::vector<std::string> compared;  // those that failed, too
   std::array<size_t, 4> counts{};
   for (size_t i = 0; i < flights.size(); ++i) {
     const Outcome& outcome = outcomes[i];
@@ -233,7 +248,7 @@ int report(const BatchFolder& folder, const std::vector<NamedFlight>& flights,
     if (outcome.kind == Outcome::kMissing) continue;
     const bool failed = outcome.kind == Outcome::kFailed;
     season.push_back({flights[i].name, failed ? std::optional(outcome.text) : std::nullopt});
-    if (!failed) estimated.push_back(flights[i].name);
+    compared.push_back(flights[i].name);
     if (outcome.kind == Outcome::kDone) std::cout << outcome.text << '\n';
   }
   if (counts[Outcome::kFinishedBefore] > 0)
@@ -242,7 +257,7 @@ int report(const BatchFolder& folder, const std::vector<NamedFlight>& flights,
     write_season(folder, season, resolved);
     std::cout << "report: " << (folder.path() / "report.html").string() << '\n';
   }
-  const bool worse = !FLAGS_compare.empty() && compare(FLAGS_compare, folder.path(), estimated);
+  const bool worse = !FLAGS_compare.empty() && compare(FLAGS_compare, folder.path(), compared);
   if (counts[Outcome::kMissing] > 0)
     std::cerr << "perch-batch: interrupted: what is missing was not begun or not finished\n";
   return counts[Outcome::kMissing] + counts[Outcome::kFailed] > 0 ? 1 : worse ? kWorse : 0;
@@ -261,6 +276,10 @@ int run(const CommandLine& line) {
   if (FLAGS_output.empty()) throw UsageError("expected --output");
   if (!FLAGS_compare.empty()) expect_run(FLAGS_compare);
   if (FLAGS_jobs < 0) throw UsageError("--jobs: expected 0 or more, found " + std::to_string(FLAGS_jobs));
+  std::error_code ignored;
+  if (!FLAGS_compare.empty() && fs::equivalent(FLAGS_compare, FLAGS_output, ignored)) {
+    throw UsageError("--compare " + FLAGS_compare + ": expected another folder than --output");
+  }
   check(config);
   const Shard shard = read_shard();
   if (shard.n > 1 && !FLAGS_compare.empty()) {

@@ -1,5 +1,6 @@
 #include "perch/analysis/compared_flight.h"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <unordered_map>
@@ -29,15 +30,19 @@ std::unordered_map<int64_t, Error> read_errors(const fs::path& file) {
   std::unordered_map<int64_t, Error> errors;
   while (csv.next()) {
     const auto fields = csv.fields();
-    const auto square = [&](size_t column) {
-      const auto value =
-          columns[column] < fields.size() ? parse_finite(fields[columns[column]]) : std::nullopt;
-      return value ? *value * *value : 0;
-    };
-    const auto time = parse_integer(fields[columns[0]]);
-    if (!time) continue;
-    const double position = square(1) + square(2) + square(3), range = square(7);
-    errors[*time] = {position, range > 0 ? position / range : 0, square(4) + square(5) + square(6)};
+    // A number that is missing is no error of zero: such a frame is not compared.
+    std::array<double, 8> squares{};
+    const auto time = columns[0] < fields.size() ? parse_integer(fields[columns[0]]) : std::nullopt;
+    bool whole = time.has_value();
+    for (size_t i = 1; i < columns.size() && whole; ++i) {
+      const auto value = columns[i] < fields.size() ? parse_finite(fields[columns[i]]) : std::nullopt;
+      whole = value.has_value();
+      if (whole) squares[i] = *value * *value;
+    }
+    if (!whole) continue;
+    const double position = squares[1] + squares[2] + squares[3], range = squares[7];
+    errors.try_emplace(
+        *time, Error{position, range > 0 ? position / range : 0, squares[4] + squares[5] + squares[6]});
   }
   return errors;
 }
@@ -49,8 +54,9 @@ std::vector<RunFrame> read_frames(const fs::path& folder) {
   std::vector<RunFrame> frames;
   while (csv.next()) {
     const auto fields = csv.fields();
+    if (std::ranges::any_of(columns, [&](size_t column) { return column >= fields.size(); })) continue;
     const auto time = parse_integer(fields[columns[0]]);
-    if (!time || columns[2] >= fields.size()) continue;
+    if (!time) continue;
     const auto error = errors.find(*time);
     frames.push_back({*time, fields[columns[1]] == "ok", parse_finite(fields[columns[2]]).value_or(0),
                       error == errors.end() ? std::nullopt : std::optional(error->second)});

@@ -67,7 +67,9 @@ ResultsDatabase::ResultsDatabase(std::filesystem::path file)
   std::error_code ignored;
   std::filesystem::remove(part_, ignored);
   sqlite3* opened = nullptr;
-  const int code = sqlite3_open(part_.c_str(), &opened);
+  // Without locks, which not every shared disk has: nobody else knows this name.
+  const int code =
+      sqlite3_open_v2(part_.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, "unix-none");
   database_.reset(opened);
   if (code != SQLITE_OK) fail();
   // The file has another name until it is whole: a journal beside it would protect nothing.

@@ -1,6 +1,7 @@
 #include "perch/flight/head_angles.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace perch {
 namespace {
@@ -28,7 +29,7 @@ std::optional<GimbalSample> gimbal_at(std::span<const GimbalSample> samples, int
                    static_cast<double>(b.timestamp_ns - a.timestamp_ns);
   const auto between = [s](double from, double to) { return (1 - s) * from + s * to; };
   GimbalSample sample{camera_time_ns, between(a.pan, b.pan), between(a.tilt, b.tilt), {}};
-  if (a.zoom && b.zoom) sample.zoom = between(*a.zoom, *b.zoom);
+  if (a.zoom && b.zoom) sample.zoom = std::lerp(*a.zoom, *b.zoom, s);  // exact where both are one
   return sample;
 }
 

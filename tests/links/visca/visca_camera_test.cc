@@ -43,7 +43,7 @@ TEST(ViscaCamera, GoesWhereItIsTold) {
     EXPECT_NEAR(said->tilt, head.tilt, kDeg / 12);
     ASSERT_TRUE(rig.camera().zoom());
     EXPECT_NEAR(*rig.camera().zoom(), 0.25, 1.0 / 1023);
-    // It is asked every second; while it is found moving nobody knows its zoom.
+    // While it is found moving nobody knows its zoom.
     rig.camera().zoom_to(1);
     rig.run(1.1);
     EXPECT_FALSE(rig.camera().zoom()) << *rig.camera().zoom();

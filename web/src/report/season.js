@@ -67,7 +67,9 @@ function histogram(season, m) {
 // ---- over time ----
 
 function trend(season, m, open) {
-  const timed = new Set(season.start_s.filter((t) => t != null)).size > 1;
+  // A clock that counts from the computer's start says nothing of the day.
+  const dated = season.start_s.every((t, i) => failed(season, i) || t > 1e9);
+  const timed = dated && new Set(season.start_s.filter((t) => t != null)).size > 1;
   const order = season.flight.map((f, i) => i).filter((i) => season[m.key][i] != null && !failed(season, i) && (!timed || season.start_s[i] != null));
   if (order.length < 3) return null;
   if (timed) order.sort((a, b) => season.start_s[a] - season.start_s[b]);

@@ -19,7 +19,8 @@ constexpr int64_t kAddressWithin = 300 * kMs;
 constexpr int64_t kBetweenCommands = 60 * kMs;
 // A drive that goes on is said again now and then: a byte on the way may have made another of it.
 constexpr int64_t kSayAgain = 500 * kMs;
-constexpr int64_t kBetweenZooms = 1000 * kMs;
+// Somebody may zoom: so long a picture may be taken for one of another lens.
+constexpr int64_t kBetweenZooms = 400 * kMs;
 constexpr int64_t kBufferFullPause = 50 * kMs;
 // The longest way at the lowest speed that is asked for, and a completion that was lost.
 constexpr int64_t kSocketFor = 5000 * kMs;
@@ -64,6 +65,8 @@ void ViscaCamera::start(State state) {
   waiting_.reset();
   sockets_ = {};
   driving_.reset();
+  zoom_.reset();
+  zoom_suspect_.reset();
   failures_ = 0;
 }
 
@@ -189,7 +192,7 @@ void ViscaCamera::take_zoom(std::span<const uint8_t> payload) {
   const bool agrees = zoom_suspect_ && std::abs(*zoom_suspect_ - zoom) < kZoomAgrees;
   zoom_suspect_ = zoom;
   if (agrees) zoom_ = zoom;
-  // Somebody zooms, or the line garbled: nobody knows until two agree again, a tenth of a second.
+  // Somebody zooms, or the line garbled: nobody knows until two agree again.
   if (zoom_ && std::abs(*zoom_ - zoom) >= kZoomAgrees) zoom_.reset();
 }
 
@@ -279,7 +282,7 @@ std::optional<ViscaCamera::Waiting> ViscaCamera::next(int64_t now_ns) {
     return waiting;
   }
   ++statistics_.inquiries;
-  if (now_ns - last_zoom_ns_ > (zoom_ ? kBetweenZooms : kBetweenZooms / 10)) {
+  if (now_ns - last_zoom_ns_ > (zoom_ ? kBetweenZooms : kBetweenZooms / 4)) {
     last_zoom_ns_ = now_ns;
     return Waiting{Ask::kZoom};
   }
