@@ -1,4 +1,4 @@
-# The two helpers that build everything: perch_add_room and perch_add_test.
+# What builds everything: perch_add_room, perch_add_program and perch_add_test.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)

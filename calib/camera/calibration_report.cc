@@ -6,6 +6,7 @@
 
 #include "calib/camera/coverage.h"
 #include "calib/camera/svg_plot.h"
+#include "perch/analysis/page.h"
 #include "perch/analysis/page_assets.h"
 #include "perch/geometry/euler.h"
 
@@ -15,17 +16,6 @@ namespace {
 constexpr int kColumns = 32, kRows = 24;
 const std::string kSeen = "var(--navigation)", kOff = "var(--vision)";
 
-constexpr std::string_view kHead = R"(<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; img-src data:">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>Perch camera calibration</title>
-<link rel="icon" href="data:,">
-<style>
-)";
 constexpr std::string_view kStyle = R"(
 .pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); gap: 1.2rem; }
 .pictures svg { display: block; }
@@ -268,7 +258,7 @@ std::string commands_section(const std::string& model) {
 
 std::string calibration_report_html(const BoardViews& views, const Calibration& calibration,
                                     const Verdict& verdict, const std::string& model_file) {
-  std::string html(kHead);
+  std::string html = page_head("Perch camera calibration", PageScripts::kNone) + "<style>\n";
   html += kReportCss;
   html += kStyle;
   html += "</style>\n</head>\n<body>\n<main>\n<h1>Perch camera calibration</h1>\n<h2>" +

@@ -214,7 +214,7 @@ Json page_json(const MountProblem& problem, const MountSolution& s, const std::v
 std::string mount_report_html(const MountProblem& problem, const MountSolution& solution,
                               const std::vector<HeldOut>& held_out, const std::string& yaml,
                               const nlohmann::json& pad) {
-  std::string html = page_head("Perch mount calibration");
+  std::string html = page_head("Perch mount calibration", PageScripts::kInline);
   const auto add = [&html](std::initializer_list<std::string_view> parts) {
     for (const std::string_view part : parts) html += part;
   };

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -24,6 +25,12 @@ constexpr char kComplete[] = "complete.json", kSummary[] = "summary.json";
   throw std::runtime_error(path.string() + ": cannot be written: " + std::generic_category().message(errno));
 }
 
+std::string host_prefix() {
+  std::array<char, 256> name{};
+  gethostname(name.data(), name.size() - 1);
+  return std::string(name.data()) + '-';
+}
+
 Json key_json(const BatchKey& key) {
   return {{"program", key.program}, {"configuration", key.configuration}, {"flight", key.flight}};
 }
@@ -36,13 +43,13 @@ BatchFolder::BatchFolder(fs::path folder) : folder_(std::move(folder)), parts_(f
   lock_ = open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (lock_ < 0) fail(lock);
   if (flock(lock_, LOCK_EX | LOCK_NB) == 0) remove_leftovers();
-  // A file system without locks: leftovers stay then, and are in nobody's way.
+  // On a file system without locks leftovers stay, and are in nobody's way.
   while (flock(lock_, LOCK_SH) != 0 && errno == EINTR) continue;
   std::string name;
   // Whoever ends at this moment removes an empty OUT/.part.
   for (int attempt = 0; attempt < 10 && own_.empty(); ++attempt) {
     fs::create_directories(parts_);
-    name = (parts_ / "XXXXXX").string();
+    name = (parts_ / (host_prefix() + "XXXXXX")).string();
     if (mkdtemp(name.data())) own_ = name;
   }
   if (own_.empty()) fail(name);
@@ -56,8 +63,11 @@ BatchFolder::~BatchFolder() {
 }
 
 void BatchFolder::remove_leftovers() const {
+  // A lock may be known on one machine alone: what others write is theirs.
   std::error_code ignored;
-  fs::remove_all(parts_, ignored);
+  for (const auto& entry : fs::directory_iterator(parts_, ignored)) {
+    if (entry.path().filename().string().starts_with(host_prefix())) fs::remove_all(entry.path(), ignored);
+  }
 }
 
 bool BatchFolder::is_finished(const std::string& flight, const BatchKey& key) const {

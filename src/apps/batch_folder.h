@@ -10,12 +10,13 @@ namespace perch {
 // OUT, the folder that a batch writes to. Several processes may write to it at once, on several machines, and
 // any may be killed at any moment: a flight is written into a folder of its process's own,
 //
-//   OUT/.part/XXXXXX/FLIGHTNAME,
+//   OUT/.part/HOST-XXXXXX/FLIGHTNAME,
 //
 // and its files are renamed into OUT/FLIGHTNAME when all are whole; last comes complete.json, which holds the
 // key and the files' sizes. So a flight is finished where complete.json says so and the sizes are true; files
-// that a power cut shortened are not. All processes hold a shared lock on OUT/.lock: who finds nobody else
-// there removes what the killed ones left.
+// that a power cut shortened are not (one that it filled with nothing, at its full size, is not noticed). All
+// processes hold a shared lock on OUT/.lock: who finds nobody else there removes what the killed ones of its
+// own machine left. What is of all flights (batch_season.h) one process writes at a time.
 class BatchFolder {
  public:
   // Creates it where it is not there. Throws std::runtime_error naming what cannot be written.

@@ -4,12 +4,14 @@
 
 namespace perch {
 
-std::string page_head(const std::string& title) {
+std::string page_head(const std::string& title, PageScripts scripts) {
+  const std::string allowed = scripts == PageScripts::kInline ? "script-src 'unsafe-inline'; " : "";
   return R"(<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; )" +
+         allowed + R"(img-src data:">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>)" +

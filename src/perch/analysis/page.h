@@ -7,9 +7,11 @@ namespace perch {
 
 // What the pages of a run and of a calibration have in common: each one file that opens offline.
 
+enum class PageScripts { kNone, kInline };
+
 // From the first line to the page's icon, within <head>. `title` is text of ours. The browser itself is told
-// that the page may load nothing.
-std::string page_head(const std::string& title);
+// that the page may load nothing, and run nothing where it has no scripts.
+std::string page_head(const std::string& title, PageScripts scripts);
 
 // JSON for within a <script>: no text in it can end that.
 std::string script_json(const nlohmann::ordered_json& json);

@@ -138,7 +138,7 @@ constexpr std::string_view kFlightBegin = "<script class=\"flight\" type=\"appli
 
 std::string page_html(const Json& season, std::span<const std::string> flights,
                       const std::string& configuration) {
-  std::string html = page_head("Perch flight report");
+  std::string html = page_head("Perch flight report", PageScripts::kInline);
   const auto add = [&html](std::initializer_list<std::string_view> parts) {
     for (const std::string_view part : parts) html += part;
   };
@@ -159,9 +159,9 @@ std::string page_html(const Json& season, std::span<const std::string> flights,
 
 std::string flight_data(const ReportFlight& flight) {
   return script_json(Json{{"summary", summary_json(flight.score)},
-                     {"frames", frames_json(flight.score)},
-                     {"pictures", pictures_json(flight)},
-                     {"pad", flight.pad}});
+                          {"frames", frames_json(flight.score)},
+                          {"pictures", pictures_json(flight)},
+                          {"pad", flight.pad}});
 }
 
 std::string flight_data_of_page(const std::string& html) {
