@@ -58,6 +58,31 @@ VehicleState state_of(const Motion& motion, int64_t timestamp_ns) {
 
 }  // namespace
 
+void VehicleFilter::Heard::take(const AutopilotSample& sample) {
+  if (sample.world_from_body) attitude = sample;
+  if (sample.body_velocity_in_world) velocity = sample;
+  if (sample.angular_velocity_in_body) angular_velocity = sample;
+}
+
+AutopilotSample VehicleFilter::Heard::at(int64_t timestamp_ns, double oldest) const {
+  constexpr double kTurn = 0.5, kPush = 2, kTurnPush = 5;  // rad/s, m/s^2, rad/s^2: of a lively body
+  const auto age = [&](const AutopilotSample& sample) {
+    const bool is_old =
+        timestamp_ns < sample.timestamp_ns || is_long_before(sample.timestamp_ns, timestamp_ns, oldest);
+    return is_old ? INFINITY : seconds(sample.timestamp_ns, timestamp_ns);
+  };
+  AutopilotSample sample;
+  sample.timestamp_ns = timestamp_ns;
+  if (age(attitude) < INFINITY) sample.world_from_body = attitude.world_from_body;
+  if (age(velocity) < INFINITY) sample.body_velocity_in_world = velocity.body_velocity_in_world;
+  if (age(angular_velocity) < INFINITY)
+    sample.angular_velocity_in_body = angular_velocity.angular_velocity_in_body;
+  sample.attitude_sigma = attitude.attitude_sigma + kTurn * age(attitude);
+  sample.velocity_sigma = velocity.velocity_sigma + kPush * age(velocity);
+  sample.angular_velocity_sigma = angular_velocity.angular_velocity_sigma + kTurnPush * age(angular_velocity);
+  return sample;
+}
+
 VehicleFilter::Known::Known(const TrackingOptions& options)
     : bank(body_hypotheses(options), pad_hypotheses(options)) {}
 
@@ -78,6 +103,7 @@ VehicleFilter::Known VehicleFilter::after(const Known& before, const Event& even
     known.timestamp_ns = event.timestamp_ns;
   }
   if (!event.pad_from_body) {
+    known.heard.take(event.sample);
     if (tracking) known.bank.hear(event.sample, options_.gate, options_.restart_after);
     return known;
   }
@@ -88,6 +114,8 @@ VehicleFilter::Known VehicleFilter::after(const Known& before, const Event& even
   if (!tracking || known.refused >= options_.restart_after) {
     known.bank.start(
         {*event.pad_from_body, options_.initial_velocity_sigma, options_.initial_angular_velocity_sigma});
+    known.bank.hear(known.heard.at(event.timestamp_ns, options_.history), options_.gate,
+                    options_.restart_after);
     known.tracking = known.believed = true;
     known.timestamp_ns = event.timestamp_ns;
     known.refused = 0;
@@ -140,11 +168,15 @@ std::optional<VehicleState> VehicleFilter::predict_widely(int64_t timestamp_ns) 
 void VehicleFilter::hear(const AutopilotSample& sample) {
   constexpr double kAhead = 1.0;  // s: cameras stall and frames are worked on, but not for that long
   const int64_t t = sample.timestamp_ns;
-  if (!last_frame_ns_ || is_long_before(t, *last_frame_ns_, options_.history) ||
-      is_long_before(*last_frame_ns_, t, kAhead)) {
+  if (last_frame_ns_ &&
+      (is_long_before(t, *last_frame_ns_, options_.history) || is_long_before(*last_frame_ns_, t, kAhead))) {
     return;
   }
   const AutopilotSample usable = usable_part(sample);
+  if (!last_frame_ns_) {
+    base_.heard.take(usable);
+    return;
+  }
   if (usable.world_from_body || usable.body_velocity_in_world || usable.angular_velocity_in_body) {
     insert({t, std::nullopt, usable});
   }

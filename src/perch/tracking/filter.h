@@ -34,7 +34,8 @@ class VehicleFilter {
                                      const std::optional<UncertainRigid3>& pad_from_body);
 
   // What the autopilot says; ignored where it is not finite, too late, or more than a second ahead of the
-  // last frame (another clock). Only known motion can be helped: it never starts tracking, nor prolongs it.
+  // last frame (another clock). It never starts tracking, nor prolongs it; but the last that was said before
+  // the first measured pose tells how fast the body is then.
   void hear(const AutopilotSample& sample);
 
   // Where the body is or will be, without changing anything; empty when not tracking, and for times that the
@@ -51,6 +52,13 @@ class VehicleFilter {
     std::optional<UncertainRigid3> pad_from_body;  // else:
     AutopilotSample sample;
   };
+  // The latest of each part that the autopilot said, and what it tells of another time, with what a lively
+  // body may have changed since in the sigmas; nothing older than `oldest` s.
+  struct Heard {
+    AutopilotSample attitude, velocity, angular_velocity;
+    void take(const AutopilotSample& sample);
+    AutopilotSample at(int64_t timestamp_ns, double oldest) const;
+  };
   // All that is known after an event.
   struct Known {
     explicit Known(const TrackingOptions& options);
@@ -59,6 +67,7 @@ class VehicleFilter {
     int64_t timestamp_ns = 0;
     int64_t last_measured_ns = 0;
     int refused = 0;  // measured poses in a row
+    Heard heard;
     MotionBank bank;
   };
   struct Entry {

@@ -8,15 +8,15 @@ namespace {
 
 // s: gusts come and go within seconds.
 constexpr double kMemory = 3.0;
-// Twenty to one. At less, chance alone makes the choice flutter.
-constexpr double kClearLead = 3.0;
 // What was much less likely once must be able to come back within a few times the memory.
 constexpr double kFarthestBehind = 30.0;
 constexpr double kDeafFor = 1.0;  // s
-// Within a few tenths of a second any motion is a straight line, and the calmest explains it best. Until then
-// the one that allows for most speaks: else the velocity above a ship's deck is off by 25 cm/s after half a
-// second, where its sigma says 11.
-constexpr double kProving = 0.9;  // s
+// Within a few tenths of a second any motion is a straight line, and pictures would prove that a deck in the
+// sea stands still: in the first second they count for little in the choice.
+constexpr double kProving = 1.0;  // s
+constexpr double kNewsWhileProving = 1.0 / 30;
+// Of the probability of the likeliest: too little to change what is said.
+constexpr double kNegligible = 1e-3;
 // Chi-squares that one honest measurement in 10,000 exceeds, of 3 and of 6 degrees of freedom.
 constexpr double kGateOf3Over6 = 21.1 / 27.9;
 
@@ -28,7 +28,6 @@ MotionBank::MotionBank(std::vector<BodyNoise> bodies, std::vector<PadNoise> pads
 void MotionBank::start(const Motion& motion) {
   members_.clear();
   for (const BodyNoise& body : bodies_) members_.push_back({body, pads_.front(), motion, 0});
-  speaker_ = 0;
   deaf_ = tracked_ = 0;
   refused_.fill(0);
 }
@@ -49,8 +48,37 @@ Motion MotionBank::Member::predicted(double dt) const {
   return later;
 }
 
+double MotionBank::news_of_motion() const { return tracked_ < kProving ? kNewsWhileProving : 1; }
+
+Motion MotionBank::predicted(double dt) const {
+  using Error = Eigen::Matrix<double, 12, 1>;
+  const auto likeliest = std::max_element(members_.begin(), members_.end(), less_likely);
+  Motion together = likeliest->predicted(dt);
+  together.forget_world();
+  double all = 0;
+  Error mean = Error::Zero();
+  Eigen::Matrix<double, 12, 12> square = Eigen::Matrix<double, 12, 12>::Zero();
+  for (const Member& member : members_) {
+    const double probability = std::exp(member.log_likelihood - likeliest->log_likelihood);
+    if (probability < kNegligible) continue;
+    const Motion motion = member.predicted(dt);
+    Error off;
+    off << pose_error(together.pad_from_body, motion.pad_from_body), motion.velocity - together.velocity,
+        motion.angular_velocity - together.angular_velocity;
+    all += probability;
+    mean += probability * off;
+    square += probability * (motion.P.topLeftCorner<12, 12>() + off * off.transpose());
+  }
+  mean /= all;
+  together.pad_from_body = perturb(together.pad_from_body, mean.head<6>());
+  together.velocity += mean.segment<3>(6);
+  together.angular_velocity += mean.tail<3>();
+  together.P = square / all - mean * mean.transpose();
+  return together;
+}
+
 template <typename InnovationOf>
-bool MotionBank::take(const InnovationOf& innovation_of, double gate) {
+bool MotionBank::take(const InnovationOf& innovation_of, double gate, double news) {
   const Member* teacher = nullptr;  // the likeliest of those that believe it
   std::vector<Motion::Surprise> surprises;
   for (const Member& member : members_) {
@@ -62,29 +90,20 @@ bool MotionBank::take(const InnovationOf& innovation_of, double gate) {
   for (size_t i = 0; i < members_.size(); ++i) {
     Member& member = members_[i];
     if (surprises[i].squared <= gate) member.motion.correct(innovation_of(member.motion));
-    member.log_likelihood += surprises[i].log_density;
+    member.log_likelihood += news * surprises[i].log_density;
   }
   for (size_t i = 0; i < members_.size(); ++i) {
     if (!(surprises[i].squared <= gate)) members_[i].motion = teacher->motion;
   }
-  choose();
-  return true;
-}
-
-void MotionBank::choose() {
-  size_t best = 0;
-  for (size_t i = 1; i < members_.size(); ++i) {
-    if (members_[i].log_likelihood > members_[best].log_likelihood) best = i;
-  }
-  const double top = members_[best].log_likelihood;
+  const double top = std::max_element(members_.begin(), members_.end(), less_likely)->log_likelihood;
   for (Member& member : members_) {
     member.log_likelihood = std::max(member.log_likelihood - top, -kFarthestBehind);
   }
-  if (tracked_ > kProving && members_[speaker_].log_likelihood < -kClearLead) speaker_ = best;
+  return true;
 }
 
 bool MotionBank::see(const UncertainRigid3& pad_from_body, double gate) {
-  return take([&](const Motion& motion) { return motion.of_pose(pad_from_body); }, gate);
+  return take([&](const Motion& motion) { return motion.of_pose(pad_from_body); }, gate, news_of_motion());
 }
 
 void MotionBank::meet_world(const AutopilotSample& sample) {
@@ -96,23 +115,18 @@ void MotionBank::meet_world(const AutopilotSample& sample) {
     }
   }
   members_ = std::move(met);
-  speaker_ *= pads_.size();
 }
 
 // Of each body's filters the likeliest is kept.
 void MotionBank::forget_world() {
   std::vector<Member> kept;
-  const size_t spoke = speaker_ / pads_.size();
   for (size_t i = 0; i < members_.size(); i += pads_.size()) {
     const auto first = members_.begin() + static_cast<std::ptrdiff_t>(i);
-    kept.push_back(*std::max_element(
-        first, first + static_cast<std::ptrdiff_t>(pads_.size()),
-        [](const Member& a, const Member& b) { return a.log_likelihood < b.log_likelihood; }));
+    kept.push_back(*std::max_element(first, first + static_cast<std::ptrdiff_t>(pads_.size()), less_likely));
     kept.back().motion.forget_world();
     kept.back().pad = pads_.front();
   }
   members_ = std::move(kept);
-  speaker_ = spoke;
   refused_.fill(0);
 }
 
@@ -121,24 +135,24 @@ void MotionBank::hear(const AutopilotSample& sample, double gate, int patience) 
     forget_world();
     deaf_ = kDeafFor;
   }
-  const bool meeting = !motion().knows_world();
+  const bool meeting = !members_.front().motion.knows_world();
   if (meeting && (deaf_ > 0 || !sample.world_from_body)) return;
   if (meeting) meet_world(sample);
-  const auto part = [&](size_t which, const auto& innovation_of) {
-    refused_[which] = take(innovation_of, gate * kGateOf3Over6) ? 0 : refused_[which] + 1;
+  const auto part = [&](size_t which, double news, const auto& innovation_of) {
+    refused_[which] = take(innovation_of, gate * kGateOf3Over6, news) ? 0 : refused_[which] + 1;
   };
   if (sample.world_from_body && !meeting) {
-    part(0, [&](const Motion& motion) {
+    part(0, news_of_motion(), [&](const Motion& motion) {
       return motion.of_attitude(*sample.world_from_body, sample.attitude_sigma);
     });
   }
   if (sample.body_velocity_in_world) {
-    part(1, [&](const Motion& motion) {
+    part(1, 1, [&](const Motion& motion) {
       return motion.of_velocity(*sample.body_velocity_in_world, sample.velocity_sigma);
     });
   }
   if (sample.angular_velocity_in_body) {
-    part(2, [&](const Motion& motion) {
+    part(2, news_of_motion(), [&](const Motion& motion) {
       return motion.of_angular_velocity(*sample.angular_velocity_in_body, sample.angular_velocity_sigma);
     });
   }

@@ -9,7 +9,7 @@ namespace perch {
 
 struct TrackingOptions {
   // White noise on the acceleration of a lively body: manoeuvres of 1 m/s^2 that last about a second. Calmer
-  // ones are tried beside it, and the likeliest speaks: body_hypotheses.
+  // ones are tried beside it, and each speaks by its probability: body_hypotheses.
   double acceleration_noise = 1.0;          // m/s^2/sqrt(Hz)
   double angular_acceleration_noise = 2.0;  // rad/s^2/sqrt(Hz)
   // Of a pad that moves, tried beside one that stands still. On the simulated deck in sea state 4 these leave
