@@ -17,6 +17,16 @@
 namespace perch {
 namespace {
 
+// By what the sigmas of so many offsets are to be multiplied, whose scatter about the fit is `scale` sigmas.
+// Where they scatter less, as the noise of the dark is not that of an edge's middle, the fit has taken a part
+// of the scatter, and a few tell it roughly.
+double spread_of(double scale, size_t offsets) {
+  constexpr double kFitted = 9, kBelieved = 30;
+  if (scale >= 1) return scale;
+  const auto n = static_cast<double>(offsets);
+  return std::min(1.0, std::sqrt((n * scale * scale + kBelieved) / (n + kBelieved - kFitted)));
+}
+
 // Regions of fewer sampled pixels are noise.
 constexpr int kLeastPixels = 3;
 
@@ -278,10 +288,11 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
   }
   plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
   plane.image_from_plane = H;
-  plane.information = fit.information / std::max(1.0, fit.scale * fit.scale);
+  const double spread = spread_of(fit.scale, offsets.size());
+  plane.information = fit.information / (spread * spread);
   double weights = 0;
   for (const EdgeOffset& o : offsets) weights += o.weight / (o.sigma * o.sigma);
-  plane.sigma_px = std::sqrt(static_cast<double>(offsets.size()) / weights) * std::max(1.0, fit.scale);
+  plane.sigma_px = std::sqrt(static_cast<double>(offsets.size()) / weights) * spread;
   plane.rms_px = fit.rms_px;
   plane.growth_px = fit.growth;
   plane.edges = static_cast<int>(offsets.size());
