@@ -71,7 +71,7 @@ std::optional<Rigid3> LiveStation::navigation_at(int64_t camera_time_ns) {
 void LiveStation::see(const Frame& frame, const Estimator::Aid& aid, const Estimate& estimate) {
   std::optional<double> latency_ms;
   if (!recorded_) latency_ms = 1e-6 * static_cast<double>(monotonic_ns() - frame.timestamp_ns);
-  station_.post(state_row(estimate, aid.angles, navigation_at(frame.timestamp_ns), latency_ms));
+  station_.post(state_row(estimate, aid, navigation_at(frame.timestamp_ns), latency_ms));
   if (station_.wants_picture())
     station_.post(std::make_shared<const SeenPicture>(SeenPicture{frame.grey.clone(), estimate}));
 }

@@ -89,7 +89,7 @@ TEST(HttpReply, LogsInByAFormOfItsOwnAlone) {
   for (const char* body : {"token=wrong", "", "token=", "token=%", "token=%zz", "x=correct-horse-battery"}) {
     Gate fresh(kToken);
     reply = reply_to(form(body), fresh, 0);
-    EXPECT_EQ(header(reply, "Location"), "/login.html?wrong") << body;
+    EXPECT_EQ(header(reply, "Location"), "/login.html#wrong") << body;
     EXPECT_EQ(header(reply, "Set-Cookie"), "") << body;
   }
   EXPECT_EQ(reply_to(form("token=correct-horse-battery", "http://evil.example"), gate, 0).status, 403);

@@ -33,8 +33,8 @@ class PictureMessage : public testing::Test {
   }
   Json json_of(const std::vector<uint8_t>& message) const {
     uint32_t length = 0;
-    std::memcpy(&length, message.data() + 4, 4);
-    return Json::parse(message.begin() + 8, message.begin() + 8 + length);
+    std::memcpy(&length, message.data(), 4);
+    return Json::parse(message.begin() + 4, message.begin() + 4 + length);
   }
 
   TestRng rng_;

@@ -7,16 +7,21 @@ namespace {
 
 // Rows of half a second at 30 Hz.
 constexpr double kReserve = 15.0 * kStateRowBytes;
-constexpr size_t kGapRowsInMessage = 30;
-// Rows of a quarter of a second, as they are on their way all the time.
-constexpr size_t kLittleInFlight = 2500;
+// 0.2 s at 64 kbit/s, for which live rows wait.
+constexpr size_t kGapRowsInMessage = 10;
+// That come at 30 Hz while a message is put together, and some.
+constexpr size_t kRowsOfATurn = 6;
 constexpr int64_t kPictureInGap = 2'000'000'000;
+// What a packet holds; and no more than 20 parts a second, which are all acknowledged.
+constexpr double kLeastPart = 1200, kMostPart = 16000, kPartsPerSecond = 20;
 
 }  // namespace
 
 ClientFeed::ClientFeed(double bandwidth_kbit, int64_t now_ns)
     : bytes_per_second_(bandwidth_kbit * 125),
       tokens_(bytes_per_second_),
+      part_bytes_(
+          static_cast<size_t>(std::clamp(bytes_per_second_ / kPartsPerSecond, kLeastPart, kMostPart))),
       refilled_ns_(now_ns),
       progress_ns_(now_ns) {}
 
@@ -64,9 +69,11 @@ std::vector<uint32_t> ClientFeed::next_rows(const StateRing& ring, int64_t now_n
   const auto room = [this](double reserve) {
     return static_cast<size_t>(std::max(0.0, tokens_ - reserve - double{kOverhead}) / double{kStateRowBytes});
   };
-  // As many as are not outdated when they are there: after a stall the rest belongs to the gap no more.
-  std::vector<uint32_t> rows = live_rows(ring, std::min(room(0), kMostInFlight / kStateRowBytes));
-  if (in_flight_ < kMostInFlight / 4) {
+  // As many as are not outdated when they are there, and those of one turn: after a stall the rest belongs to
+  // the gap no more.
+  const size_t most = std::max((kMostInFlight - in_flight_) / kStateRowBytes, kRowsOfATurn);
+  std::vector<uint32_t> rows = live_rows(ring, std::min(room(0), most));
+  if (may_send_part(now_ns)) {
     const size_t left = std::min(room(kReserve), kGapRowsInMessage);
     std::vector<uint32_t> gap = gap_rows(ring, left > rows.size() ? left - rows.size() : 0);
     gap.insert(gap.end(), rows.begin(), rows.end());
@@ -76,30 +83,34 @@ std::vector<uint32_t> ClientFeed::next_rows(const StateRing& ring, int64_t now_n
   return rows;
 }
 
-bool ClientFeed::may_send_picture(int64_t now_ns) {
+bool ClientFeed::may_begin_picture(int64_t now_ns) {
   refill(now_ns);
-  if (gap_end_ > gap_first_ && picture_ns_ && now_ns - *picture_ns_ < kPictureInGap) return false;
-  return asked_ && !picture_in_flight_ && in_flight_ <= kLittleInFlight &&
-         tokens_ >= picture_bytes_ + kReserve;
+  if (!whole() && picture_ns_ && now_ns - *picture_ns_ < kPictureInGap) return false;
+  return asked_ && may_send_part(now_ns) && tokens_ >= picture_bytes_ + kReserve;
 }
 
-void ClientFeed::sent(size_t bytes, bool picture, int64_t now_ns) {
-  refill(now_ns);
-  if (messages_.empty()) progress_ns_ = now_ns;
-  messages_.push_back({bytes + kOverhead, picture});
-  in_flight_ += bytes + kOverhead;
-  tokens_ -= static_cast<double>(bytes + kOverhead);
-  if (!picture) return;
+bool ClientFeed::may_send_part(int64_t now_ns) const {
+  return in_flight_ <= kLittleInFlight &&
+         (messages_.empty() || now_ns - messages_.front().sent_ns < kShortlyInFlight);
+}
+
+void ClientFeed::began_picture(size_t bytes, int64_t now_ns) {
   picture_bytes_ = static_cast<double>(bytes);
   picture_ns_ = now_ns;
-  picture_in_flight_ = true;
+}
+
+void ClientFeed::sent(size_t bytes, int64_t now_ns) {
+  refill(now_ns);
+  if (messages_.empty()) progress_ns_ = now_ns;
+  messages_.push_back({bytes + kOverhead, now_ns});
+  in_flight_ += bytes + kOverhead;
+  tokens_ -= static_cast<double>(bytes + kOverhead);
 }
 
 bool ClientFeed::acknowledged(uint64_t message, int64_t now_ns) {
   if (message > acknowledged_ + messages_.size()) return false;
   while (acknowledged_ < message) {
     in_flight_ -= messages_.front().bytes;
-    if (messages_.front().picture) picture_in_flight_ = false;
     messages_.pop_front();
     ++acknowledged_;
   }

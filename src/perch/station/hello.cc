@@ -1,6 +1,7 @@
 #include "perch/station/hello.h"
 
 #include "perch/analysis/pad_json.h"
+#include "perch/geometry/euler.h"
 
 namespace perch {
 namespace {
@@ -19,6 +20,22 @@ Json corner_rays(const CameraModel& camera) {
   return rays;
 }
 
+// `direction`, `point` [m]; it turns by scale * reading + zero_deg.
+Json axis_json(const HeadAxis& axis) {
+  const auto list = [](const Eigen::Vector3d& v) { return Json{v.x(), v.y(), v.z()}; };
+  return {{"direction", list(axis.direction)},
+          {"point", list(axis.point)},
+          {"scale", axis.scale},
+          {"zero_deg", axis.zero * kDegFromRad}};
+}
+
+Json head_json(const std::optional<PanTilt>& head) {
+  if (!head) return nullptr;
+  return {{"pan", axis_json(head->pan)},
+          {"tilt", axis_json(head->tilt)},
+          {"pan_carries_tilt", head->order == HeadOrder::kPanCarriesTilt}};
+}
+
 }  // namespace
 
 Json hello_json(const StationScene& scene, const StationOptions& options) {
@@ -35,7 +52,7 @@ Json hello_json(const StationScene& scene, const StationOptions& options) {
                  {"height", scene.camera.height()},
                  {"rays", corner_rays(scene.camera)}}},
                {"compared", frames.world_from_pad.has_value()},
-               {"pan_tilt", frames.pan_tilt.has_value()},
+               {"pan_tilt", head_json(frames.pan_tilt)},
                {"body_from_base", transform_json(frames.body_from_base.value_or(Rigid3{}))}};
   json["base_from_camera"] =
       transform_json(frames.pan_tilt ? frames.pan_tilt->base_from_zero : frames.base_from_camera);

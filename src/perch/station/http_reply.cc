@@ -14,7 +14,8 @@ constexpr std::pair<const char*, const char*> kAlways[] = {
      "'self'; form-action 'self'; frame-ancestors 'none'; base-uri 'none'"},
     {"X-Content-Type-Options", "nosniff"},
     {"X-Frame-Options", "DENY"},
-    {"Referrer-Policy", "no-referrer"},
+    // "no-referrer" would have browsers send the log-in form itself with "Origin: null".
+    {"Referrer-Policy", "same-origin"},
     {"Cross-Origin-Opener-Policy", "same-origin"},
     {"Cross-Origin-Resource-Policy", "same-origin"}};
 
@@ -68,7 +69,7 @@ HttpReply log_in(const HttpQuestion& question, Gate& gate, int64_t now_ns) {
     reply.headers.emplace_back("Retry-After", "60");
     return reply;
   }
-  if (result.outcome == Gate::LogIn::kWrong) return led_to("/login.html?wrong");
+  if (result.outcome == Gate::LogIn::kWrong) return led_to("/login.html#wrong");
   HttpReply reply = led_to("/");
   reply.headers.emplace_back("Set-Cookie", std::string(Gate::kCookie) + "=" + result.session +
                                                "; Path=/; HttpOnly; SameSite=Strict; Max-Age=" +

@@ -167,7 +167,7 @@ std::vector<uint8_t> picture_message(const SeenPicture& picture, const LandingTa
   json["bits"] = bits.size();
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   const auto length = static_cast<uint32_t>(text.size());
-  std::vector<uint8_t> bytes{2, 0, 0, 0};
+  std::vector<uint8_t> bytes;
   for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<uint8_t>(length >> (8 * i)));
   append(text, bytes);
   append(jpeg, bytes);

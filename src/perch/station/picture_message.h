@@ -36,8 +36,8 @@ nlohmann::json overlay_json(const LandingTarget& target, const CameraModel& came
 nlohmann::json outline_json(const LandingTarget& target, const CameraModel& camera,
                             const Rigid3& camera_from_target);
 
-// The message of a picture: u8 2 | u8 0 | u16 0 | u32 length of the JSON | JSON | JPEG | bits, where the JSON
-// says how long the last two are and which part of the picture they show. About 8 kB.
+// A picture as it is sent: u32 length of the JSON | JSON | JPEG | bits, where the JSON says how long the last
+// two are and which part of the picture they show. About 8 kB.
 std::vector<uint8_t> picture_message(const SeenPicture& picture, const LandingTarget& target,
                                      const CameraModel& camera, const PictureWish& wish);
 

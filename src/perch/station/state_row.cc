@@ -17,7 +17,7 @@ void put_pose(const Rigid3& pad_from_body, float* at) {
   at[5] = static_cast<float>(angles.roll * kDegFromRad);
 }
 
-// The variances of yaw, pitch and roll, of a rotation vector's covariance: columns of the map from their
+// The deviations of yaw, pitch and roll, of a rotation vector's covariance: columns of the map from their
 // rates to an angular velocity in the pad's axes, inverted. Near pitch = +-90 deg they are boundless.
 Eigen::Vector3d angle_sigmas(const Rigid3& pad_from_body, const Eigen::Matrix3d& covariance) {
   const YawPitchRoll a = ypr_from_rotation(pad_from_body.rotation);
@@ -50,7 +50,7 @@ void put(Unsigned value, std::vector<uint8_t>& bytes) {
 
 }  // namespace
 
-StateRow state_row(const Estimate& estimate, const std::optional<HeadAngles>& angles,
+StateRow state_row(const Estimate& estimate, const Estimator::Aid& aid,
                    const std::optional<Rigid3>& navigation, std::optional<double> latency_ms) {
   StateRow row;
   row.timestamp_ns = estimate.timestamp_ns;
@@ -74,10 +74,11 @@ StateRow state_row(const Estimate& estimate, const std::optional<HeadAngles>& an
   row.values[StateRow::kFeatures] = static_cast<float>(estimate.features);
   row.values[StateRow::kEstimate] = static_cast<float>(1e-3 * estimate.total_us);
   if (latency_ms) row.values[StateRow::kLatency] = static_cast<float>(*latency_ms);
-  if (angles) {
-    row.values[StateRow::kPan] = static_cast<float>(angles->pan * kDegFromRad);
-    row.values[StateRow::kTilt] = static_cast<float>(angles->tilt * kDegFromRad);
+  if (aid.angles) {
+    row.values[StateRow::kPan] = static_cast<float>(aid.angles->pan * kDegFromRad);
+    row.values[StateRow::kTilt] = static_cast<float>(aid.angles->tilt * kDegFromRad);
   }
+  if (aid.zoom) row.values[StateRow::kZoom] = static_cast<float>(*aid.zoom);
   return row;
 }
 

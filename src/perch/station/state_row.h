@@ -29,8 +29,9 @@ struct StateRow {
     kAmbiguity,
     kEstimate,  // ms, the estimator's own time
     kLatency,   // ms, exposure to estimate; of a recording NaN
-    kPan,       // deg
+    kPan,       // deg, as the head reads
     kTilt,
+    kZoom,  // as the camera tells it, 0 widest to 1 narrowest, or in the zoom table's unit
     kValues
   };
   std::array<float, kValues> values{};
@@ -42,10 +43,10 @@ inline constexpr std::string_view kStateRowColumns[StateRow::kValues] = {
     "sigma_z",  "sigma_yaw", "sigma_pitch", "sigma_roll", "v_x",     "v_y",     "v_z",       "w_x",
     "w_y",      "w_z",       "nav_x",       "nav_y",      "nav_z",   "nav_yaw", "nav_pitch", "nav_roll",
     "cam_x",    "cam_y",     "cam_z",       "cam_q_w",    "cam_q_x", "cam_q_y", "cam_q_z",   "reprojection",
-    "features", "ambiguity", "estimate_ms", "latency_ms", "pan",     "tilt"};
+    "features", "ambiguity", "estimate_ms", "latency_ms", "pan",     "tilt",    "zoom"};
 
 // Everything but the number in the sequence. `navigation`: pad_from_body as navigation has it.
-StateRow state_row(const Estimate& estimate, const std::optional<HeadAngles>& angles,
+StateRow state_row(const Estimate& estimate, const Estimator::Aid& aid,
                    const std::optional<Rigid3>& navigation, std::optional<double> latency_ms);
 
 // One row, little-endian:   u32 sequence | u8 status | u8 source | u16 0 | i64 timestamp | f32 values...

@@ -120,19 +120,18 @@ void Watcher::tick() {
 }
 
 bool Watcher::wants_picture(int64_t now_ns) {
-  return open_ && (wish_.grey || wish_.binary) && !writing_ && told_picture_ == server_.picture_number &&
-         feed_.may_send_picture(now_ns);
+  return open_ && (wish_.grey || wish_.binary) && !picture_ && told_picture_ == server_.picture_number &&
+         feed_.may_begin_picture(now_ns);
 }
 
 void Watcher::send_next() {
   if (!open_ || writing_) return;
-  picture_.reset();
-  rows_.clear();
+  bytes_.clear();
   text_.clear();
   if (choose()) send(text_.empty());
 }
 
-// Fills one of text_, rows_ and picture_.
+// Fills text_ or bytes_.
 bool Watcher::choose() {
   if (!greeted_) {
     greeted_ = true;
@@ -142,8 +141,8 @@ bool Watcher::choose() {
   const int64_t now_ns = station_now_ns();
   const auto rows = feed_.next_rows(server_.ring, now_ns);
   if (!rows.empty()) {
-    rows_ = {1, 0, 0, 0};
-    for (const uint32_t row : rows) append_row(server_.ring.at(row), rows_);
+    bytes_ = {1, static_cast<uint8_t>(feed_.whole()), 0, 0};
+    for (const uint32_t row : rows) append_row(server_.ring.at(row), bytes_);
     return true;
   }
   if (feed_.in_flight() > ClientFeed::kMostInFlight) return false;
@@ -157,18 +156,34 @@ bool Watcher::choose() {
     text_ = server_.status;
     return true;
   }
-  if (told_picture_ == server_.picture_number || !feed_.may_send_picture(now_ns)) return false;
-  told_picture_ = server_.picture_number;
-  if (wish_.grey || wish_.binary) picture_ = server_.picture_for(wish_);
-  return picture_ != nullptr;
+  return choose_part(now_ns);
+}
+
+bool Watcher::choose_part(int64_t now_ns) {
+  if (!picture_) {
+    if (told_picture_ == server_.picture_number || !feed_.may_begin_picture(now_ns)) return false;
+    told_picture_ = server_.picture_number;
+    if (wish_.grey || wish_.binary) picture_ = server_.picture_for(wish_);
+    if (!picture_) return false;
+    picture_sent_ = 0;
+    feed_.began_picture(picture_->size(), now_ns);
+  }
+  if (!feed_.may_send_part(now_ns)) return false;
+  const size_t size = std::min(feed_.part_bytes(), picture_->size() - picture_sent_);
+  const auto begin = picture_->begin() + static_cast<std::ptrdiff_t>(picture_sent_);
+  picture_sent_ += size;
+  const bool last = picture_sent_ == picture_->size();
+  bytes_ = {2, static_cast<uint8_t>(last), 0, 0};
+  bytes_.insert(bytes_.end(), begin, begin + static_cast<std::ptrdiff_t>(size));
+  if (last) picture_.reset();
+  return true;
 }
 
 void Watcher::send(bool binary) {
-  const auto buffer = picture_ ? boost::asio::buffer(*picture_)
-                      : binary ? boost::asio::buffer(static_cast<const void*>(rows_.data()), rows_.size())
-                               : boost::asio::buffer(static_cast<const void*>(text_.data()), text_.size());
+  const auto buffer = binary ? boost::asio::buffer(static_cast<const void*>(bytes_.data()), bytes_.size())
+                             : boost::asio::buffer(static_cast<const void*>(text_.data()), text_.size());
   writing_ = true;
-  feed_.sent(buffer.size(), picture_ != nullptr, station_now_ns());
+  feed_.sent(buffer.size(), station_now_ns());
   server_.bytes_out += buffer.size();
   socket_.binary(binary);
   socket_.async_write(buffer, [self = shared_from_this()](const beast::error_code& error, size_t) {

@@ -18,11 +18,11 @@ namespace perch {
 // One page that watches: a WebSocket with at most one message on the way to the kernel. Messages out are
 // numbered from 1, and the page acknowledges each.
 //
-//   out   {"hello": ...} first, {"status": ...}, {"event": ...}; binary: rows (1), a picture (2)
+//   out   {"hello": ...} first, {"status": ...}, {"event": ...}; binary: rows (1), a part of a picture (2)
 //   in    {"from": {"session": "...", "sequence": 17}}   what it has of which run; the first message
 //         {"ack": 12}   {"view": {"grey": true, "binary": true, "close": false}}
 //         {"do": "record" | "stop" | "mark" | "centre", "text": "..."}
-// What is in it and none of these ends the connection.
+// What is in it and none of these ends the connection. docs/STATION.md says what is in each.
 class Watcher : public std::enable_shared_from_this<Watcher> {
  public:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
@@ -41,6 +41,7 @@ class Watcher : public std::enable_shared_from_this<Watcher> {
   bool hear_command(const nlohmann::json& message);
   void send_next();
   bool choose();
+  bool choose_part(int64_t now_ns);
   void send(bool binary);
   void hang_up();
 
@@ -48,9 +49,10 @@ class Watcher : public std::enable_shared_from_this<Watcher> {
   boost::beast::websocket::stream<boost::beast::tcp_stream> socket_;
   Request request_;
   boost::beast::flat_buffer incoming_;
-  std::vector<uint8_t> rows_;
+  std::vector<uint8_t> bytes_;  // on the way to the kernel: these, or
   std::string text_;
-  std::shared_ptr<const std::vector<uint8_t>> picture_;
+  std::shared_ptr<const std::vector<uint8_t>> picture_;  // that is being sent
+  size_t picture_sent_ = 0;                              // bytes of it
   ClientFeed feed_;
   PictureWish wish_;
   bool open_ = false, writing_ = false, greeted_ = false;

@@ -18,6 +18,10 @@ export class Link extends EventTarget {
     this.hello = null;
     this.messages = 0;
     this.heard = 0;
+    /** @type {ArrayBuffer[]} */
+    this.parts = [];  // of a picture that is on its way
+    /** @type {number|null} */
+    this.missing = null;  // the first row of a gap that is being filled
     /** @type {WebSocket|null} */
     this.socket = null;
     this.open();
@@ -26,6 +30,7 @@ export class Link extends EventTarget {
 
   open() {
     this.messages = 0;
+    this.parts = [];
     this.heard = performance.now();
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     const socket = this.socket = new WebSocket(`${scheme}://${location.host}/live`);
@@ -39,10 +44,16 @@ export class Link extends EventTarget {
     this.bytes += data.byteLength ?? data.length;
     this.send({ack: ++this.messages});
     if (typeof data === 'string') return this.hearText(JSON.parse(data));
-    const kind = new Uint8Array(data, 0, 1)[0];
+    const [kind, whole] = new Uint8Array(data, 0, 2);
     if (kind === 1) this.store.addRows(data, this.hello.row_bytes);
-    if (kind === 2) this.store.addPicture(data);
-    this.tell(kind === 1 ? 'rows' : 'picture');
+    if (kind === 1 && whole) this.missing = null;
+    if (kind === 1) return this.tell('rows');
+    this.parts.push(data.slice(4));
+    if (!whole) return;
+    new Blob(this.parts.splice(0)).arrayBuffer().then((picture) => {
+      this.store.addPicture(picture);
+      this.tell('picture');
+    });
   }
 
   hearText(message) {
@@ -53,12 +64,17 @@ export class Link extends EventTarget {
 
   greet(hello) {
     // Another run of the program counts its frames anew.
-    if (hello.session !== this.session) this.store.clear();
+    if (hello.session !== this.session) {
+      this.store.clear();
+      this.missing = null;
+    }
     this.session = hello.session;
     this.hello = hello;
     this.retry = FIRST_RETRY_MS;
     this.connected = true;
-    this.send({from: {session: hello.session, sequence: this.store.next}});
+    // Cut off while a gap was being filled, the newest first: its rest is still missing.
+    this.missing ??= this.store.next;
+    this.send({from: {session: hello.session, sequence: this.missing}});
     this.send({view: this.view});
     this.tell('hello', hello);
   }
@@ -73,10 +89,17 @@ export class Link extends EventTarget {
   }
 
   lost() {
+    if (!this.connected) this.askForLogIn();
     this.connected = false;
     this.tell('lost');
     setTimeout(() => this.open(), this.retry);
     this.retry = Math.min(2 * this.retry, LAST_RETRY_MS);
+  }
+
+  // A socket says nothing of why it was refused: a page that is led to the log-in does.
+  async askForLogIn() {
+    const answer = await fetch('/', {method: 'HEAD', redirect: 'manual', cache: 'no-store'}).catch(() => null);
+    if (answer?.type === 'opaqueredirect') this.tell('logged out');
   }
 
   checkSilence() {

@@ -17,9 +17,11 @@ const OTHERS = [
   ['reprojection [px]', ['reprojection'], ['RMS']],
   ['time [ms]', ['estimate_ms', 'latency_ms'], ['estimate', 'since exposure']],
 ];
+const HEAD = /** @type {typeof OTHERS} */ ([['head [°]', ['pan', 'tilt'], ['pan', 'tilt']]]);
 
 export class LivePlots {
   constructor(choose) {
+    this.shown = OTHERS;
     this.choose = choose;  // a time was pointed at
     this.legend = legend([['background:var(--vision)', 'vision'], ['background:var(--sigma);height:.8em', '± 1 σ'],
                           ['background:var(--navigation)', 'navigation'], ['background:var(--gap);height:.8em', 'no pose']]);
@@ -43,7 +45,7 @@ export class LivePlots {
     this.element.append(this.states.element);
     this.states.draw();
     const grid = this.element.appendChild(element('div', {class: 'others'}));
-    this.others = OTHERS.map(([label, columns, names]) => {
+    this.others = this.shown.map(([label, columns, names]) => {
       const parent = grid.appendChild(element('figure'));
       const colours = [theme('vision'), ...COLOURS.slice(1)];
       return timePlot(parent, this.group, {
@@ -56,6 +58,14 @@ export class LivePlots {
     });
   }
 
+  // With a head that turns the camera, its angles, too.
+  setHead(turns) {
+    const shown = turns ? [...OTHERS, ...HEAD] : OTHERS;
+    if (shown.length === this.shown.length) return;
+    this.shown = shown;
+    this.draw();
+  }
+
   all() { return [...this.states.plots, ...this.others]; }
 
   /** @param {import('./store.js').Row[]} rows of the stretch @param {Record<string, number>} column */
@@ -65,9 +75,11 @@ export class LivePlots {
     this.gaps = gapsOf(times, rows.map((row) => String(row.status)));
     this.states.set({times, vision: STATES.map(get), sigma: STATES.map((name) => get('sigma_' + name)),
                      navigation: STATES.map((name) => get('nav_' + name)), gaps: this.gaps});
-    this.others.forEach((plot, i) => plot.setData([times, ...OTHERS[i][1].map(get)], false));
+    this.others.forEach((plot, i) => plot.setData([times, ...this.shown[i][1].map(get)], false));
     this.group.quiet = true;
     for (const plot of this.all()) plot.setScale('x', {min: from, max: to});
     this.group.quiet = false;
+    // Without a pointer in it a plot's legend says what is now.
+    for (const plot of this.all()) if (times.length && !(plot.cursor.left >= 0)) plot.setLegend({idx: times.length - 1}, false);
   }
 }

@@ -12,6 +12,23 @@ function rotation(yaw, pitch, roll) {
   return about(0, 0, 1, yaw).multiply(about(0, 1, 0, pitch)).multiply(about(1, 0, 0, roll));
 }
 
+// A head's axis at its reading, in degrees: perch/frames/frame_chain.h's head_turn.
+function headTurn({direction, point, scale, zero_deg: zero}, reading) {
+  const q = new Quaternion().setFromAxisAngle(new Vector3(...direction), (scale * reading + zero) * RAD);
+  const through = new Vector3(...point);
+  return {p: through.clone().sub(through.clone().applyQuaternion(q)), q};
+}
+
+// Where the camera is in its base; null while nobody knows where the head looks.
+function baseFromCamera(hello, pan, tilt) {
+  const base = place(hello.base_from_camera), head = hello.pan_tilt;
+  if (!head) return base;
+  if (!isFinite(pan) || !isFinite(tilt)) return null;
+  const turns = [headTurn(head.pan, pan), headTurn(head.tilt, tilt)];
+  if (!head.pan_carries_tilt) turns.reverse();
+  return turns.reduce(product, base);
+}
+
 /** @param {Scene} scene @param {import('./store.js').Row|null} row @param {import('./store.js').Row[]} rows */
 export function showRow(scene, hello, row, rows, column) {
   const v = (name, of = row) => (of ? of.values[column[name]] : NaN);
@@ -20,13 +37,8 @@ export function showRow(scene, hello, row, rows, column) {
   if (!row || !isFinite(v('x'))) return scene.show(null, trail);
   const q = rotation(v('yaw'), v('pitch'), v('roll'));
   const body = {p: new Vector3(...at(row)), q};
-  let base = place(hello.base_from_camera);
-  if (hello.pan_tilt) {
-    const pan = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), (v('pan') || 0) * RAD);
-    const tilt = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), (v('tilt') || 0) * RAD);
-    base = {p: base.p, q: base.q.clone().multiply(pan).multiply(tilt)};
-  }
-  const camera = product(product(body, place(hello.body_from_base)), base);
+  const base = baseFromCamera(hello, v('pan'), v('tilt'));
+  const camera = base && product(product(body, place(hello.body_from_base)), base);
   scene.show({position: at(row), body: [q.w, q.x, q.y, q.z],
-              camera: [...camera.p.toArray(), camera.q.w, camera.q.x, camera.q.y, camera.q.z]}, trail, hello.camera.rays);
+              camera: camera ? [...camera.p.toArray(), camera.q.w, camera.q.x, camera.q.y, camera.q.z] : undefined}, trail, hello.camera.rays);
 }

@@ -66,7 +66,7 @@ document.getElementById('station')?.append(
         element('div', {class: 'card'}, element('div', {class: 'cap'}, element('h2', {}, 'Camera'), closeButton), picture.element,
             element('p', {class: 'note'}, 'Residuals of the edges ×60, σ of the pad’s centre in yellow.')),
         sceneCard,
-        element('div', {class: 'card'}, element('h2', {}, 'Black and white'), binary.element),
+        element('div', {class: 'side'}, element('div', {class: 'card'}, element('h2', {}, 'Black and white'), binary.element), status.eventsElement),
         status.element),
     plotsPart,
     element('footer', {}, pauseButton, slider, when, stretchButton));
@@ -81,6 +81,7 @@ link.addEventListener('hello', (event) => {
   status.clearEvents();
   for (const one of [recordButton, markButton]) one.toggleAttribute('hidden', !hello.control);
   centreButton.toggleAttribute('hidden', !hello.control || !hello.pan_tilt);
+  livePlots.setHead(!!hello.pan_tilt);
   scene?.setPad(hello.pad);
   connection.textContent = 'connected';
   connection.className = 'ok';
@@ -91,6 +92,8 @@ link.addEventListener('lost', () => {
   connection.className = 'bad';
   stale = true;
 });
+// What was seen stays to be looked at until somebody goes there.
+link.addEventListener('logged out', () => connection.replaceChildren(element('a', {href: '/login.html'}, 'log in again')));
 link.addEventListener('rows', () => {
   lastRowMs = performance.now();
   for (const row of store.rows.slice(-30)) if (row.status) lastFailure = `${STATUSES[row.status].words} at ${fixed(row.t, 2)} s`;

@@ -4,6 +4,7 @@ import {fixed, short} from '../common/format.js';
 import {STATUSES} from '../common/names.js';
 
 const MOST_EVENTS = 30;
+const DOING = {follows: 'follows the pad', searches: 'searches the pad', blind: 'knows no way', rests: 'is not moved', centres: 'goes to its middle'};
 const gigabytes = (bytes) => (bytes >= 1e9 ? `${short(bytes / 1e9)} GB` : `${short(bytes / 1e6)} MB`);
 
 export class Status {
@@ -11,8 +12,8 @@ export class Status {
     this.list = element('dl', {class: 'facts'});
     this.findings = element('ul', {class: 'findings'});
     this.events = element('ol', {class: 'events', id: 'events'});
-    this.element = element('section', {class: 'card status', 'aria-label': 'status'}, element('h2', {}, 'Status'), this.list, this.findings,
-        element('h3', {}, 'Events'), this.events);
+    this.element = element('section', {class: 'card status', 'aria-label': 'status'}, element('h2', {}, 'Status'), this.list, this.findings);
+    this.eventsElement = element('section', {class: 'card log', 'aria-label': 'events'}, element('h2', {}, 'Events'), this.events);
     this.facts = new Map();
   }
 
@@ -35,7 +36,10 @@ export class Status {
     const problem = picture?.ns === row.ns ? picture.overlay.problem : '';
     this.fact('frame', row.status === 0 ? `pose of ${v('features')} features, ${short(v('reprojection'))} px` : problem || words, row.status === 0 ? 'ok' : 'bad');
     this.fact('time', `${short(v('estimate_ms'))} ms to estimate` + (isFinite(v('latency_ms')) ? `, ${fixed(v('latency_ms'), 1)} ms since exposure` : ''));
-    if (hello.pan_tilt) this.fact('head', `pan ${fixed(v('pan'), 1)}°, tilt ${fixed(v('tilt'), 1)}°`);
+    if (!hello.pan_tilt) return;
+    const known = isFinite(v('pan')) && isFinite(v('tilt'));
+    this.fact('head', (known ? `pan ${fixed(v('pan'), 1)}°, tilt ${fixed(v('tilt'), 1)}°` : 'angles not known') +
+              (isFinite(v('zoom')) ? `, zoom ${fixed(v('zoom'), 2)}` : ''), known ? 'ok' : 'bad');
   }
 
   /** @param {any} status as perch-live tells it (src/apps/live_station.cc) */
@@ -43,8 +47,9 @@ export class Status {
     const ok = status.counts.ok, all = status.frames;
     this.fact('frames', `${ok} of ${all} with a pose (${all ? fixed(100 * ok / all, 1) : '–'} %)`);
     this.fact('last failure', lastFailure || 'none seen', lastFailure ? 'wait' : 'ok');
-    const {camera, recording, link} = status;
+    const {camera, recording, link, head} = status;
     this.fact('camera', camera.problem || (camera.dropped ? `${camera.dropped} pictures lost` : 'well'), camera.problem ? 'bad' : camera.dropped ? 'wait' : 'ok');
+    if (head) this.fact('head drive', head.ready ? DOING[head.doing] ?? head.doing : 'does not answer', !head.ready ? 'bad' : head.doing === 'follows' ? 'ok' : 'wait');
     if (link) {
       this.fact('link', link.text, link.heard ? 'ok' : 'bad');
       this.fact('autopilot', link.heard ? link.autopilot : 'not heard');

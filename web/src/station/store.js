@@ -36,7 +36,7 @@ export class Store {
   get next() { return this.rows.length ? this.rows[this.rows.length - 1].sequence + 1 : 0; }
   get last() { return this.rows[this.rows.length - 1] ?? null; }
 
-  // A message of rows (perch/station/state_row.h): u8 1, three bytes, then the rows.
+  // A message of rows (perch/station/state_row.h): u8 1, u8 nothing missed is left, u16 0, then the rows.
   addRows(buffer, rowBytes) {
     const view = new DataView(buffer);
     const added = [];
@@ -64,12 +64,12 @@ export class Store {
     while (this.pictures.length && this.pictures[0].t < oldest) this.pictures.shift();
   }
 
-  // A message of a picture (perch/station/picture_message.h).
+  // A whole picture (perch/station/picture_message.h).
   addPicture(buffer) {
-    const length = new DataView(buffer).getUint32(4, true);
-    const overlay = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)));
+    const length = new DataView(buffer).getUint32(0, true);
+    const overlay = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
     const ns = BigInt(overlay.t);
-    const jpegAt = 8 + length, bitsAt = jpegAt + overlay.jpeg;
+    const jpegAt = 4 + length, bitsAt = jpegAt + overlay.jpeg;
     this.pictures.push({
       t: this.seconds(ns), ns, overlay,
       jpeg: overlay.jpeg ? new Blob([new Uint8Array(buffer, jpegAt, overlay.jpeg)], {type: 'image/jpeg'}) : null,
