@@ -27,7 +27,22 @@ export function saveCsv(rows, hello) {
   save(new Blob([csvOf(rows, hello.columns)], {type: 'text/csv'}), fileName(hello.title, rows[0], 'csv'));
 }
 
-// Every canvas of the page that is in it, where it is.
+// What is written in one line, where it is; the header, which stays in sight, at the top.
+function drawTexts(context, root, all, ratio) {
+  const header = root.querySelector('header');
+  for (const one of root.querySelectorAll('#badge, .title, .numerals dt, .numerals dd, .numerals small, .card:not(.status, .log) h2')) {
+    const place = one.getBoundingClientRect(), style = getComputedStyle(one);
+    const top = place.top - (header.contains(one) ? header.getBoundingClientRect().top : all.top);
+    context.fillStyle = style.backgroundColor;
+    context.fillRect((place.left - all.left) * ratio, top * ratio, place.width * ratio, place.height * ratio);
+    context.fillStyle = style.color;
+    context.font = `${style.fontWeight} ${parseFloat(style.fontSize) * ratio}px ${style.fontFamily}`;
+    context.textBaseline = 'middle';
+    context.fillText(one.textContent, (place.left - all.left + parseFloat(style.paddingLeft)) * ratio, (top + place.height / 2) * ratio);
+  }
+}
+
+// Every canvas of the page that is in it, where it is, and the numerals.
 export function savePng(root, row, hello) {
   const all = root.getBoundingClientRect();
   const ratio = Math.min(devicePixelRatio, 2);
@@ -42,5 +57,6 @@ export function savePng(root, row, hello) {
     if (!place.width || !canvas.width) continue;
     context.drawImage(canvas, (place.left - all.left) * ratio, (place.top - all.top) * ratio, place.width * ratio, place.height * ratio);
   }
+  drawTexts(context, root, all, ratio);
   sheet.toBlob((blob) => blob && save(blob, fileName(hello.title, row, 'png')));
 }

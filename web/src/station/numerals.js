@@ -6,8 +6,8 @@ const TILES = [
   ['x', 'm', 2], ['y', 'm', 2], ['z', 'm', 2], ['yaw', '°', 1], ['pitch', '°', 1], ['roll', '°', 1],
 ];
 
-// A deviation is known to two digits at best.
-const two = (value) => String(Number(value.toPrecision(2)));
+// A deviation is known to two digits at best, and nobody flies by a tenth of a millimetre.
+const two = (value, least) => (value < least ? `< ${least}` : `± ${Number(value.toPrecision(2))}`);
 
 export class Numerals {
   constructor() {
@@ -28,7 +28,7 @@ export class Numerals {
       const {value, sigma} = this.cells[name];
       value.textContent = fixed(v(name), digits);
       const s = v('sigma_' + name);
-      sigma.textContent = isFinite(s) ? `± ${unit === 'm' ? two(100 * s) + ' cm' : two(s) + '°'}` : '';
+      sigma.textContent = !isFinite(s) ? '' : unit === 'm' ? `${two(100 * s, 0.1)} cm` : `${two(s, 0.01)}°`;
     }
     this.cells.speed.value.textContent = fixed(Math.hypot(v('v_x'), v('v_y'), v('v_z')), 2);
     this.cells.speed.sigma.textContent = isFinite(v('v_z')) ? `${fixed(v('v_z'), 2)} along z` : '';

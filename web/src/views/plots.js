@@ -65,9 +65,9 @@ export function axis(label, more) {
   }, more);
 }
 
-export const yAxis = (label, more) => axis(label, Object.assign({
-  size: 52, values: (plot, ticks) => ticks.map((v) => (v == null ? '' : String(+v.toPrecision(6)).replace('-', '−'))),
-}, more));
+const numbers = (plot, ticks) => ticks.map((v) => (v == null ? '' : String(+v.toPrecision(6)).replace('-', '−')));
+
+export const yAxis = (label, more) => axis(label, Object.assign({size: 52, values: numbers}, more));
 
 // A line; `count` decides whether single points can be told apart.
 export function line(label, colour, count, more) {
@@ -98,7 +98,7 @@ export function timePlot(parent, group, what) {
   const options = {
     height,
     scales: Object.assign({x: {time: false}}, scales),
-    axes: axes || [axis('time [s]', {size: 28}), yAxis(label)],
+    axes: axes || [axis('time [s]', {size: 28, values: numbers}), yAxis(label)],
     series: [{label: 'time', value: (plot, v) => (v == null ? '–' : v.toFixed(3) + ' s')}, ...series],
     bands,
     cursor: {
