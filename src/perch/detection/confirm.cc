@@ -25,6 +25,15 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
+// The same of the steps' contrasts, which are whole numbers.
+double median_contrast(std::span<const FoundStep> steps) {
+  std::array<size_t, 256> counts{};
+  for (const FoundStep& step : steps) ++counts[static_cast<size_t>(std::clamp(step.contrast, 0.0, 255.0))];
+  size_t below = 0, level = 0;
+  while (level < 255 && (below += counts[level]) <= steps.size() / 2) ++level;
+  return static_cast<double>(level);
+}
+
 }  // namespace
 
 ImageFrame frame_of(const Eigen::Matrix3d& H, const Eigen::Vector2d& centre, double size) {
@@ -87,6 +96,13 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
   if (holes_asked >= 3 && 2 * holes < holes_asked) return false;
   return squares >= requirement.squares && border_edges >= requirement.border_edges && asked >= kLeastLines &&
          found >= requirement.found * asked;
+}
+
+// Whether all lines across all four edges show them where they should be.
+bool Confirmation::is_whole(size_t shape) const {
+  return std::ranges::all_of(std::span(tallies_).subspan(4 * shape, 4), [](const EdgeTally& tally) {
+    return tally.asked >= kLastLines && tally.found == tally.asked;
+  });
 }
 
 // The pixel where a point of the plane is seen; empty where it is not in the picture.
@@ -238,9 +254,7 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
   }
   // What is found must be where it should be, not only near.
   widths_.clear();
-  contrasts_.clear();
-  for (const FoundStep& step : steps_) contrasts_.push_back(step.contrast);
-  result.contrast = median(contrasts_);
+  result.contrast = median_contrast(steps_);
   for (EdgeTally& tally : tallies_) tally.found = 0;
   for (size_t i = 0; i < offsets_.size(); ++i) {
     const EdgeOffset& o = offsets_[i];
@@ -251,9 +265,10 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
   }
   const Eigen::Matrix3d& H = result.image_from_plane;
   if (!is_met(grey, H, requirement)) return std::nullopt;
-  contradicted_ = std::ranges::any_of(target_.shapes, [&](const TargetShape& shape) {
-    return shape.kind == ShapeKind::kSquare && is_beside(grey, H, shape, result.contrast);
-  });
+  for (size_t i = 0; i < target_.shapes.size() && !contradicted_; ++i) {
+    contradicted_ = target_.shapes[i].kind == ShapeKind::kSquare && !is_whole(i) &&
+                    is_beside(grey, H, target_.shapes[i], result.contrast);
+  }
   if (contradicted_ || !is_layout(grey, H)) return std::nullopt;
   for (const EdgeTally& tally : tallies_) {
     result.found += tally.found;

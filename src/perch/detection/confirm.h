@@ -58,6 +58,7 @@ class Confirmation {
 
  private:
   bool is_met(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, const Requirement& requirement);
+  bool is_whole(size_t shape) const;
   std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                         const TargetShape& square) const;
   std::optional<int> grey_at(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
@@ -76,7 +77,7 @@ class Confirmation {
   std::vector<EdgeOffset> offsets_;
   std::vector<FoundStep> steps_;
   std::vector<EdgeTally> tallies_, in_order_;
-  std::vector<double> widths_, contrasts_;
+  std::vector<double> widths_;
   std::bitset<kMostShapes> seen_;  // as in Confirmed
 };
 

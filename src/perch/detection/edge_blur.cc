@@ -25,16 +25,26 @@ Eigen::Matrix2d fit_blur(std::span<const WidthSample> samples, double expected_p
     Eigen::Matrix3d A = prior.cwiseAbs2().cwiseInverse().asDiagonal();
     Eigen::Vector3d b(expected / (prior(0) * prior(0)), 0, 0);
     double sum = 0, count = 0;
+    double a01 = 0, a02 = 0, a11 = 0, a12 = 0, a22 = 0, information = 0;
     for (const WidthSample& s : samples) {
-      const Eigen::Vector2d& n = s.normal;
-      const Eigen::Vector3d row(1, n.x() * n.x() - n.y() * n.y(), 2 * n.x() * n.y());
-      const double r = s.squared - row.dot(x), variance = s.variance * scale;
-      const double weight = round == 0 ? 1 : 1 / (1 + 0.25 * r * r / variance);
-      A += weight / variance * row * row.transpose();
-      b += weight / variance * s.squared * row;
-      sum += weight * r * r / s.variance;
-      count += weight;
+      const double u = s.normal.x() * s.normal.x() - s.normal.y() * s.normal.y();
+      const double v = 2 * s.normal.x() * s.normal.y();
+      const double r = s.squared - x(0) - x(1) * u - x(2) * v, variance = s.variance * scale;
+      const double weighted = 1 / (round == 0 ? variance : variance + 0.25 * r * r);
+      information += weighted;
+      a01 += weighted * u;
+      a02 += weighted * v;
+      a11 += weighted * u * u;
+      a12 += weighted * u * v;
+      a22 += weighted * v * v;
+      b += weighted * s.squared * Eigen::Vector3d(1, u, v);
+      sum += weighted * r * r;
+      count += weighted * variance;
     }
+    sum *= scale;
+    Eigen::Matrix3d products;
+    products << information, a01, a02, a01, a11, a12, a02, a12, a22;
+    A += products;
     x = A.ldlt().solve(b);
     if (round > 0 && count > 3) scale = std::max(1.0, sum / count);
   }

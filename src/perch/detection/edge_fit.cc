@@ -19,18 +19,18 @@ static_assert(StepTemplates::kPixels == 2 * kNarrow);
 
 // Sums over lines, from which level, contrast and offset follow.
 struct Sums {
-  float n = 0, t = 0, g = 0, tt = 0, tg = 0, gg = 0, w = 0, tw = 0, gw = 0, ww = 0,
-        xt = 0;                     // of the templates' products
-  cv::v_int32x4 i, it, ig, iw, ii;  // of the pixels' with them
-  double shift = 0;                 // from the templates' places to the expected, sum over lines
-  double part = 0;                  // of the piece, sum over lines
+  cv::v_float32x4 templates[StepTemplates::kSums / 4];  // of the templates' products
+  cv::v_int32x4 i, it, ig, iw, ii;                      // of the pixels' with them
+  double shift = 0;  // from the templates' places to the expected, sum over lines
+  double part = 0;   // of the piece, sum over lines
   int lines = 0;
 
-  Sums() : i(cv::v_setzero_s32()), it(i), ig(i), iw(i), ii(i) {}
+  Sums() : i(cv::v_setzero_s32()), it(i), ig(i), iw(i), ii(i) {
+    for (auto& four : templates) four = cv::v_setzero_f32();
+  }
 
   // Eight pixels of a line from the template's pixel `from` on.
-  void add(const uint8_t* pixels, const StepTemplates::Template& a, int from) {
-    const cv::v_int16x8 grey = cv::v_reinterpret_as_s16(cv::v_load_expand(pixels));
+  void add(const cv::v_int16x8& grey, const StepTemplates::Template& a, int from) {
     const cv::v_int16x8 seen = grey & cv::v_load(a.inside + from);
     i += cv::v_dotprod(seen, cv::v_setall_s16(1));
     it += cv::v_dotprod(grey, cv::v_load(a.step + from));
@@ -39,12 +39,24 @@ struct Sums {
     ii += cv::v_dotprod(seen, seen);
   }
   void add(const StepTemplates::Template& a, double off) {
-    n += a.n, t += a.t, g += a.g, tt += a.tt, tg += a.tg, gg += a.gg, w += a.w, tw += a.tw, gw += a.gw,
-        ww += a.ww, xt += a.xt;
+    for (int k = 0; k < StepTemplates::kSums / 4; ++k) templates[k] += cv::v_load(a.sums + 4 * k);
     shift += off;
     ++lines;
   }
 };
+
+cv::v_int16x8 eight_pixels(const uint8_t* p) { return cv::v_reinterpret_as_s16(cv::v_load_expand(p)); }
+
+// Of every `step`-th byte. Put together in a register: bytes that are written one by one are not there yet
+// when eight are read at once.
+cv::v_int16x8 eight_pixels(const uint8_t* p, std::ptrdiff_t step) {
+  const auto four = [step](const uint8_t* q) {
+    return static_cast<uint32_t>(q[0] | q[step] << 8 | q[2 * step] << 16) | static_cast<uint32_t>(q[3 * step])
+                                                                                << 24;
+  };
+  const uint64_t eight = four(p) | static_cast<uint64_t>(four(p + 4 * step)) << 32;
+  return eight_pixels(reinterpret_cast<const uint8_t*>(&eight));
+}
 
 }  // namespace
 
@@ -75,26 +87,30 @@ namespace {
 // By the piece alone. A blur that is not the templates' is odd about the step, as the contrast is, and shifts
 // nothing.
 bool solve(const Sums& s, EdgeFit::Piece& piece) {
-  if (s.lines == 0 || !(s.n > 4)) return false;
-  constexpr double kOne = StepTemplates::kOne;
-  piece.A << s.n, s.t, s.g, s.t, s.tt, s.tg, s.g, s.tg, s.gg;
+  using T = StepTemplates;
+  float sum[T::kSums];
+  for (int k = 0; k < T::kSums / 4; ++k) cv::v_store(sum + 4 * k, s.templates[k]);
+  if (s.lines == 0 || !(sum[T::kN] > 4)) return false;
+  constexpr double kOne = T::kOne;
+  piece.A << sum[T::kN], sum[T::kT], sum[T::kG], sum[T::kT], sum[T::kTT], sum[T::kTG], sum[T::kG],
+      sum[T::kTG], sum[T::kGG];
   piece.b << cv::v_reduce_sum(s.i), cv::v_reduce_sum(s.it) / kOne, cv::v_reduce_sum(s.ig) / kOne;
-  piece.xt = s.xt;
-  piece.by_w = Eigen::Vector3d(s.w, s.tw, s.gw);
-  piece.ww = s.ww;
+  piece.xt = sum[T::kXT];
+  piece.by_w = Eigen::Vector3d(sum[T::kW], sum[T::kTW], sum[T::kGW]);
+  piece.ww = sum[T::kWW];
   piece.off = s.shift / s.lines;
   piece.part = s.part / s.lines;
   piece.inverse = piece.A.inverse();
   const Eigen::Vector3d by_narrower = piece.inverse * piece.by_w;
   const double iw = cv::v_reduce_sum(s.iw) / kOne;
-  const double left = iw - by_narrower.dot(piece.b), own = s.ww - piece.by_w.dot(by_narrower);
-  piece.narrower = own > 1e-3 * s.ww ? left / own : 0;
+  const double left = iw - by_narrower.dot(piece.b), own = piece.ww - piece.by_w.dot(by_narrower);
+  piece.narrower = own > 1e-3 * piece.ww ? left / own : 0;
   piece.own = piece.inverse * piece.b - by_narrower * piece.narrower;
   if (!piece.own.allFinite()) return false;
   // That of rounding to whole grey levels at least, however small the residuals of a few.
   const double explained = piece.b.dot(piece.own) + iw * piece.narrower;
   const double residual = std::max(0.0, cv::v_reduce_sum(s.ii) - explained);
-  piece.variance = std::max((residual + 4 * 1.0) / static_cast<double>(s.n), 1.0 / 12);
+  piece.variance = std::max((residual + 4 * 1.0) / piece.A(0, 0), 1.0 / 12);
   return true;
 }
 
@@ -104,7 +120,6 @@ bool fit_lines(const cv::Mat& grey, const CrossingLines& lines, int step, const 
   Sums sums;
   const int count = lines.rows() ? grey.rows : grey.cols, width = lines.rows() ? grey.cols : grey.rows;
   const int from = narrow ? kNarrow / 2 : 0, pixels = narrow ? kNarrow : 2 * kNarrow;
-  uint8_t column[StepTemplates::kPixels];
   for (int at = std::max(lines.first(), 0); at <= std::min(lines.last(), count - 1); at += step) {
     const double crossing = lines.crossing(at) + piece.shift;
     const int middle = cvRound(crossing);
@@ -114,15 +129,16 @@ bool fit_lines(const cv::Mat& grey, const CrossingLines& lines, int step, const 
     double phase = crossing - middle;
     const double wanted = phase;
     const auto& a = templates.at(&phase);
-    const uint8_t* line = column;
     if (lines.rows()) {
-      line = grey.ptr<uint8_t>(at) + begin;
+      const uint8_t* line = grey.ptr<uint8_t>(at) + begin;
+      sums.add(eight_pixels(line), a, from);
+      if (!narrow) sums.add(eight_pixels(line + kNarrow), a, kNarrow);
     } else {
-      const uint8_t* pixel = grey.ptr<uint8_t>(begin) + at;
-      for (int k = 0; k < pixels; ++k, pixel += grey.step[0]) column[k] = *pixel;
+      const uint8_t* line = grey.ptr<uint8_t>(begin) + at;
+      const auto pitch = static_cast<std::ptrdiff_t>(grey.step[0]);
+      sums.add(eight_pixels(line, pitch), a, from);
+      if (!narrow) sums.add(eight_pixels(line + kNarrow * pitch, pitch), a, kNarrow);
     }
-    sums.add(line, a, from);
-    if (!narrow) sums.add(line + kNarrow, a, kNarrow);
     sums.add(a, wanted - phase);
   }
   return solve(sums, piece);

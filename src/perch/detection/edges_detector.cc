@@ -50,6 +50,9 @@ constexpr double kExplained = 0.85;
 // A piece of an edge for the fine fit: an arc over this length is a parabola to a hundredth of a pixel.
 constexpr double kPiece = 32;  // px
 
+// As many whole edges tell a homography, some of them covered.
+constexpr size_t kEnoughEdges = 24;
+
 // No lens is sharper, its pixels included; what seems to be is drawn without a lens.
 constexpr double kSharpest = 0.45;  // px
 
@@ -266,14 +269,21 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
   Eigen::Matrix3d H = found.image_from_plane;
   PlaneFit fit;
   FitOptions how{(options.lines_per_edge + 3) / 4, found.blur, options.min_contrast, false};
+  const auto look = [&](double longest, int lines) {
+    project_edges(edges, H, camera, longest, pieces);
+    on_ground.clear();
+    for (const EdgePiece& piece : pieces) on_ground.push_back(is_outline(piece));
+    FitOptions with = how;
+    with.lines_per_edge = lines;
+    edge_fit.measure(grey, pieces, on_ground, plane.frame, with, offsets, measured);
+  };
   // The first round finds the blur and what is left to a tenth of a pixel, of few lines; the next all of it.
   constexpr int kMostRounds = 3;
   for (int round = 0; round < kMostRounds; ++round) {
     plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
-    project_edges(edges, H, camera, kPiece, pieces);
-    on_ground.clear();
-    for (const EdgePiece& piece : pieces) on_ground.push_back(is_outline(piece));
-    edge_fit.measure(grey, pieces, on_ground, plane.frame, how, offsets, measured);
+    // Where enough of them are measured, whole edges will do for the first round.
+    if (round == 0) look(kWhole, 2 * how.lines_per_edge);
+    if (round > 0 || offsets.size() < kEnoughEdges) look(kPiece, how.lines_per_edge);
     if (offsets.size() < 10) return std::nullopt;
     share_growth();
     // What a fit to a blurred step makes of one bent by the sensor's response differs by its reach.

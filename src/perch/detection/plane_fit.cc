@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <opencv2/core/hal/intrin.hpp>
+#include <span>
 
 namespace perch {
 namespace {
@@ -35,36 +36,60 @@ Row row_of(const EdgeOffset& o) {
   return row;
 }
 
-// The sum of weighted products of rows with themselves, four columns at a time.
-struct Products {
-  cv::v_float32x4 sum[kColumns][3];
+using Four = cv::v_float32x4;
 
-  Products() {
-    for (auto& of_row : sum) {
-      for (auto& four : of_row) four = cv::v_setzero_f32();
+struct FourRows {
+  Four sum[4][3];
+
+  FourRows() {
+    for (auto& row : sum) {
+      for (Four& four : row) four = cv::v_setzero_f32();
     }
   }
-  void add(const Row& row, float weight) {
-    const cv::v_float32x4 a = cv::v_load(row.data()), b = cv::v_load(row.data() + 4),
-                          c = cv::v_load(row.data() + 8);
-    for (int i = 0; i < kColumns; ++i) {
-      const cv::v_float32x4 w = cv::v_setall_f32(weight * row[static_cast<size_t>(i)]);
-      // The matrix is symmetric: from the diagonal's four on.
-      if (i < 4) sum[i][0] += w * a;
-      if (i < 8) sum[i][1] += w * b;
-      sum[i][2] += w * c;
+  // A row's columns from the four of `kFirst` on times those four, which are weighted.
+  template <int kFirst>
+  void add(const Four& weighted, const Four (&row)[3]) {
+    const Four each[4] = {cv::v_broadcast_element<0>(weighted), cv::v_broadcast_element<1>(weighted),
+                          cv::v_broadcast_element<2>(weighted), cv::v_broadcast_element<3>(weighted)};
+    for (int i = 0; i < 4; ++i) {
+      for (int k = kFirst; k < 3; ++k) sum[i][k] += each[i] * row[k];
     }
-  }
-  Eigen::Matrix<double, kColumns, kColumns> matrix() const {
-    Eigen::Matrix<double, kColumns, kColumns> M;
-    for (int i = 0; i < kColumns; ++i) {
-      std::array<float, 12> row{};
-      for (int k = 0; k < 3; ++k) cv::v_store(row.data() + 4 * k, sum[i][k]);
-      for (int j = i; j < kColumns; ++j) M(i, j) = M(j, i) = static_cast<double>(row[static_cast<size_t>(j)]);
-    }
-    return M;
   }
 };
+
+// The sum of the rows' weighted products with themselves, which is symmetric. In two turns: each has no more
+// sums than a processor has registers.
+Eigen::Matrix<double, kColumns, kColumns> products_of(std::span<const Row> rows,
+                                                      std::span<const float> weights) {
+  FourRows upper, middle, lower;
+  const auto load = [&](size_t i, Four(&row)[3]) {
+    for (int k = 0; k < 3; ++k) row[k] = cv::v_load(rows[i].data() + 4 * k);
+    return cv::v_setall_f32(weights[i]);
+  };
+  Four row[3];
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const Four weight = load(i, row);
+    upper.add<0>(weight * row[0], row);
+  }
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const Four weight = load(i, row);
+    middle.add<1>(weight * row[1], row);
+    lower.add<2>(weight * row[2], row);
+  }
+  float sums[12][12] = {};
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      cv::v_store(&sums[i][4 * k], upper.sum[i][k]);
+      cv::v_store(&sums[4 + i][4 * k], middle.sum[i][k]);
+      cv::v_store(&sums[8 + i][4 * k], lower.sum[i][k]);
+    }
+  }
+  Eigen::Matrix<double, kColumns, kColumns> M;
+  for (int i = 0; i < kColumns; ++i) {
+    for (int j = i; j < kColumns; ++j) M(i, j) = M(j, i) = static_cast<double>(sums[i][j]);
+  }
+  return M;
+}
 
 float residual_of(const Row& row, const std::array<float, 12>& x) {
   const cv::v_float32x4 products = cv::v_load(row.data()) * cv::v_load(x.data()) +
@@ -78,14 +103,20 @@ float residual_of(const Row& row, const std::array<float, 12>& x) {
 float robust_scale(const std::vector<float>& residuals) {
   constexpr int kShift = 18, kLowest = 127 - 10, kBins = 20 << 5;  // 32 to the octave, from 2^-10 to 2^10
   std::array<uint16_t, kBins> histogram{};
+  std::array<uint16_t, kBins / 32> octaves{};
   for (const float r : residuals) {
     const int bin = static_cast<int>(std::bit_cast<uint32_t>(std::abs(r)) >> kShift) - (kLowest << 5);
-    ++histogram[static_cast<size_t>(std::clamp(bin, 0, kBins - 1))];
+    const auto clamped = static_cast<size_t>(std::clamp(bin, 0, kBins - 1));
+    ++histogram[clamped];
+    ++octaves[clamped / 32];
   }
-  size_t below = 0;
-  int bin = 0;
-  while (bin < kBins - 1 && 2 * (below += histogram[static_cast<size_t>(bin)]) < residuals.size()) ++bin;
-  return 1.4826F * std::bit_cast<float>(static_cast<uint32_t>(bin + (kLowest << 5)) << kShift);
+  size_t below = 0, bin = 0;
+  while (bin + 32 < kBins && 2 * (below + octaves[bin / 32]) < residuals.size()) {
+    below += octaves[bin / 32];
+    bin += 32;
+  }
+  while (bin + 1 < kBins && 2 * (below += histogram[bin]) < residuals.size()) ++bin;
+  return 1.4826F * std::bit_cast<float>((static_cast<uint32_t>(bin) + (kLowest << 5)) << kShift);
 }
 
 }  // namespace
@@ -120,13 +151,14 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
                    double steepest) {
   // Kept from call to call for their memory.
   thread_local std::vector<Row> rows;
-  thread_local std::vector<float> residuals;
+  thread_local std::vector<float> residuals, weights;
   PlaneFit fit;
   Unknowns x = Unknowns::Zero();
   Normal information = Normal::Zero();
   rows.clear();
   for (const EdgeOffset& o : offsets) rows.push_back(row_of(o));
   residuals.resize(rows.size());
+  weights.assign(rows.size(), 1);
   std::array<float, 12> step{};
   step[10] = -1;
   float scale = 1;
@@ -140,13 +172,11 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
     // Twice the scale: 95 % efficient on Gaussian noise, Cauchy's. The first round knows no better than that
     // all may be right, and doubts the far ones less.
     const float bound = 2.4F * scale;
-    Products products;
     for (size_t i = 0; i < rows.size(); ++i) {
-      const float r = std::abs(residuals[i]) / bound, weight = 1 / (1 + (round == 0 ? r : r * r));
-      offsets[i].weight = static_cast<double>(weight);
-      products.add(rows[i], weight);
+      const float r = std::abs(residuals[i]) / bound;
+      weights[i] = 1 / (1 + (round == 0 ? r : r * r));
     }
-    const auto M = products.matrix();
+    const auto M = products_of(rows, weights);
     information = M.topLeftCorner<10, 10>();
     Normal held = information;
     const double perspective = 1 / std::pow(steepest * frame.radius, 2);
@@ -174,14 +204,15 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
   const Eigen::Matrix<double, 8, 2> by_growth = information.topRightCorner<8, 2>();
   fit.information =
       information.topLeftCorner<8, 8>() - by_growth * of_growth.inverse() * by_growth.transpose();
-  double squares = 0, weights = 0;
+  double squares = 0, sum = 0;
   for (size_t i = 0; i < rows.size(); ++i) {
     const double r = offsets[i].sigma * static_cast<double>(residuals[i]);
     offsets[i].left = r;
+    offsets[i].weight = static_cast<double>(weights[i]);
     squares += offsets[i].weight * r * r;
-    weights += offsets[i].weight;
+    sum += offsets[i].weight;
   }
-  fit.rms_px = weights > 0 ? std::sqrt(squares / weights) : 0;
+  fit.rms_px = sum > 0 ? std::sqrt(squares / sum) : 0;
   return fit;
 }
 

@@ -28,18 +28,20 @@ StepTemplates::StepTemplates(double sigma, double reach) : reach_(reach), templa
       a.inside[i] = -1;
       a.step[i] = static_cast<int16_t>(std::lround(kOne * step));
       a.slope[i] = static_cast<int16_t>(std::lround(kOne * slope));
-      a.n += 1;
-      a.t += static_cast<float>(step);
-      a.g += static_cast<float>(slope);
-      a.tt += static_cast<float>(step * step);
-      a.tg += static_cast<float>(step * slope);
-      a.gg += static_cast<float>(slope * slope);
-      a.narrower[i] = static_cast<int16_t>(std::lround(kOne * x * slope));
-      a.w += static_cast<float>(x * slope);
-      a.tw += static_cast<float>(x * step * slope);
-      a.gw += static_cast<float>(x * slope * slope);
-      a.ww += static_cast<float>(x * slope * x * slope);
-      a.xt += static_cast<float>(x * step);
+      const double narrower = x * slope;
+      a.narrower[i] = static_cast<int16_t>(std::lround(kOne * narrower));
+      const auto add = [&a](int sum, double product) { a.sums[sum] += static_cast<float>(product); };
+      add(kN, 1);
+      add(kT, step);
+      add(kG, slope);
+      add(kTT, step * step);
+      add(kTG, step * slope);
+      add(kGG, slope * slope);
+      add(kW, narrower);
+      add(kTW, step * narrower);
+      add(kGW, slope * narrower);
+      add(kWW, narrower * narrower);
+      add(kXT, x * step);
     }
   }
 }

@@ -16,13 +16,15 @@ class StepTemplates {
   static constexpr int kPixels = 16;  // -8 .. 7 about the line's middle pixel
   static constexpr int kPhases = 64;
   static constexpr int kOne = 4096;  // 1 in fixed point
+  // Of the sums: inside, step, slope and narrower by themselves and with each other, x with the step.
+  enum { kN, kT, kG, kTT, kTG, kGG, kW, kTW, kGW, kWW, kXT, kSums = 12 };
 
   struct Template {
     // Within `reach` of the step, elsewhere 0: all bits, the step from -1/2 to 1/2 (kOne is 1), its slope,
     // and the slope times the place x from the step: what a blur adds that is narrower.
     alignas(16) int16_t inside[kPixels], step[kPixels], slope[kPixels], narrower[kPixels];
     // Sums of products of them, the first counting as 1; and of x with the step.
-    float n, t, g, tt, tg, gg, w, tw, gw, ww, xt;
+    alignas(16) float sums[kSums];
   };
 
   // A step blurred by a Gaussian of `sigma` px along the line, looked at within `reach` px (at most 7).

@@ -20,8 +20,10 @@ PlaneInformation deformed(const PlaneInformation& information, double px2, doubl
 void learn(const PlaneInformation& root, const Eigen::Matrix<double, 8, 6>& J, double squares,
            double step_per_px, Deformation& deformation) {
   constexpr double kSpare = 2;  // a homography has eight numbers, a pose six
-  const PlaneInformation M = step_per_px * step_per_px * root * root.transpose();
-  const Eigen::Matrix<double, 6, 6> JtMJ = J.transpose() * M * J;
+  // By coefficients: Eigen's product for large matrices takes thrice as long for these.
+  const PlaneInformation M = step_per_px * step_per_px * root.lazyProduct(root.transpose());
+  const Eigen::Matrix<double, 8, 6> MJ = M.lazyProduct(J);
+  const Eigen::Matrix<double, 6, 6> JtMJ = J.transpose().lazyProduct(MJ);
   const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> normal(Eigen::Matrix<double, 6, 6>(J.transpose() * J));
   const double trace = M.trace() - normal.solve(JtMJ).trace();
   // Two squares of unit variance vary by 4 in units of 1 / trace, of which the deformation that is allowed
