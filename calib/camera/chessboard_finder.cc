@@ -2,6 +2,8 @@
 #include <array>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
+#include <vector>
 
 #include "calib/camera/board_finder.h"
 #include "calib/camera/edge_width.h"
@@ -98,17 +100,21 @@ void refine(const cv::Mat& grey, Corners& corners) {
   }
 }
 
+// A board that fills a tenth of a picture of this width has squares of a dozen pixels, which is enough to
+// find it; a picture twice as wide takes four times as long.
+constexpr int kWideEnough = 640;  // px
+
 class ChessboardFinder : public BoardFinder {
  public:
   explicit ChessboardFinder(const Chessboard& board) : board_(board) {}
 
   BoardSighting find(const cv::Mat& grey) override {
+    halve(grey);
     BoardSighting sighting;
     const cv::Size size(board_.columns, board_.rows);
     cv::Mat found;
-    // EXHAUSTIVE finds more and takes several times as long: only where the first look shows nothing.
-    if (!cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_ACCURACY) &&
-        !cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_ACCURACY | cv::CALIB_CB_EXHAUSTIVE)) {
+    const auto level = look(size, found);
+    if (!level) {
       sighting.problem =
           "no " + std::to_string(size.width) + "x" + std::to_string(size.height) + " chessboard";
       return sighting;
@@ -118,7 +124,12 @@ class ChessboardFinder : public BoardFinder {
       const auto& p = found.at<cv::Point2f>(i);
       corners.at.emplace_back(p.x, p.y);
     }
-    refine(grey, corners);
+    // From each size to the next, so that none begins farther off than it can see.
+    for (size_t i = *level;; --i) {
+      refine(sizes_[i], corners);
+      if (i == 0) break;
+      for (auto& p : corners.at) p = 2 * p + Eigen::Vector2d(0.5, 0.5);
+    }
     corners = settled(grey, corners, size.width, size.height);
     for (int row = 0; row < size.height; ++row) {
       for (int column = 0; column < size.width; ++column) {
@@ -130,7 +141,38 @@ class ChessboardFinder : public BoardFinder {
   }
 
  private:
+  // The picture, and halved until it is small enough to look for a board quickly.
+  void halve(const cv::Mat& grey) {
+    sizes_.resize(1);
+    sizes_[0] = grey;
+    while (std::max(sizes_.back().cols, sizes_.back().rows) >= 2 * kWideEnough) {
+      cv::Mat half;
+      // Even sizes alone: a pixel is then exactly the mean of four.
+      const cv::Mat even =
+          sizes_.back()(cv::Rect(0, 0, sizes_.back().cols / 2 * 2, sizes_.back().rows / 2 * 2));
+      cv::resize(even, half, {}, 0.5, 0.5, cv::INTER_AREA);
+      sizes_.push_back(half);
+    }
+  }
+
+  // The size at which the board shows, if any. CALIB_CB_EXHAUSTIVE and CALIB_CB_ACCURACY (which doubles the
+  // picture first) find more and take ten times as long: only where the first look shows nothing. Of large
+  // pictures the last look is for boards whose squares are too small in the smallest.
+  std::optional<size_t> look(const cv::Size& size, cv::Mat& found) const {
+    const size_t smallest = sizes_.size() - 1;
+    const auto shows = [&](size_t level, int flags) {
+      return cv::findChessboardCornersSB(sizes_[level], size, found, flags);
+    };
+    // Neither flag's finds hold all of the other's.
+    for (const int flags : {0, int{cv::CALIB_CB_ACCURACY}, cv::CALIB_CB_ACCURACY | cv::CALIB_CB_EXHAUSTIVE}) {
+      if (shows(smallest, flags)) return smallest;
+    }
+    if (smallest > 0 && shows(0, cv::CALIB_CB_EXHAUSTIVE)) return 0;
+    return std::nullopt;
+  }
+
   Chessboard board_;
+  std::vector<cv::Mat> sizes_;
 };
 
 }  // namespace
