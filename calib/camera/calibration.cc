@@ -1,5 +1,6 @@
 #include "calib/camera/calibration.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <future>
@@ -119,6 +120,16 @@ CrossValidation cross_validate(const BoardViews& views, const std::string& lens,
   return result;
 }
 
+// What can be told of a fit, or why nothing can.
+LensCovariance covariance_of(const BoardViews& views, const LensFit& fit) {
+  try {
+    return lens_covariance(views, fit);
+  } catch (const CalibrationError& e) {
+    const auto missing = what_is_missing(views, fit);
+    throw CalibrationError(e.what() + (missing.empty() ? std::string() : ". " + missing.front()));
+  }
+}
+
 Candidate solve(const BoardViews& views, const std::string& lens, const LensSeed& seed,
                 const FitOptions& options) {
   Candidate candidate;
@@ -127,7 +138,7 @@ Candidate solve(const BoardViews& views, const std::string& lens, const LensSeed
   try {
     check_views(views, lens);
     candidate.fit = fit_lens(views, lens, seed, options);
-    candidate.covariance = lens_covariance(views, candidate.fit);
+    candidate.covariance = covariance_of(views, candidate.fit);
     if (!candidate.fit.converged)
       candidate.failure = "did not come to an end in mrcal's 300 iterations, twice";
     if (views.views.size() >= kFewestToHalve)
@@ -225,9 +236,22 @@ void compare_seeds(const BoardViews& views, const CalibrationOptions& options, C
   }
 }
 
-// Long lenses: the regularisation, made for focal lengths of some hundred pixels, pulls harder there than the
-// corners do. Where it moves the lens by more than a sigma and is not what holds it together, the free solve
-// is right.
+// By how many standard deviations of the free solve the regularisation has moved the parameters (root mean
+// square, whitened): what noise makes of the difference is less than 1 (Hausman, Econometrica 46, 1978). 0 of
+// a spline, whose knots that nobody saw have no free solve.
+double moved_in_sigmas(const Candidate& held, const Candidate& free) {
+  const Eigen::MatrixXd covariance = free.covariance.intrinsics();
+  const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
+  if (llt.info() != Eigen::Success) return 0;
+  const auto n = covariance.rows();
+  const Eigen::VectorXd moved = Eigen::Map<const Eigen::VectorXd>(held.fit.intrinsics.data(), n) -
+                                Eigen::Map<const Eigen::VectorXd>(free.fit.intrinsics.data(), n);
+  return llt.matrixL().solve(moved).norm() / std::sqrt(static_cast<double>(n));
+}
+
+// mrcal's regularisation is made for focal lengths of some hundred pixels and corners good to a pixel. Of
+// longer lenses and better corners it pulls harder than these do: where it moves the lens by more than a
+// sigma and is not what holds it together, the free solve is right.
 void compare_regularisation(const BoardViews& views, Calibration& calibration) {
   const Candidate& held = calibration.best();
   const auto free = std::ranges::find_if(calibration.candidates, [&](const Candidate& c) {
@@ -239,16 +263,17 @@ void compare_regularisation(const BoardViews& views, Calibration& calibration) {
     return root_mean_square(uncertainty_map(c.fit, c.covariance, kAtInfinity, kColumns, kRows), covered);
   };
   const std::vector<double> weight(covered.begin(), covered.end());
-  const double moved = root_mean_square(
+  const double moved_px = root_mean_square(
       model_difference(held.fit.model(), free->fit.model(), kColumns, kRows, weight).length, covered);
-  const double sigma_held = sigma(held);
+  const double sigma_held = sigma(held),
+               moved = std::max(moved_px / sigma_held, moved_in_sigmas(held, *free));
   const bool decided = sigma(*free) < 2 * sigma_held;
   const bool predicts = !held.cross_validation || !free->cross_validation ||
                         is_as_good(*free->cross_validation, *held.cross_validation);
-  if (!(moved > sigma_held) || !decided || !predicts) return;
+  if (!(moved > 1) || !decided || !predicts) return;
   calibration.chosen = static_cast<size_t>(free - calibration.candidates.begin());
-  calibration.why += " The regularisation moves it by " + rounded(moved) +
-                     " px, more than its standard deviation, so the solve without it was taken.";
+  calibration.why += " The regularisation moves it by " + rounded(moved) + " standard deviations, " +
+                     rounded(moved_px) + " px, so the solve without it was taken.";
 }
 
 }  // namespace
@@ -264,7 +289,7 @@ Candidate calibrate_once(const BoardViews& views, const std::string& lens,
   Candidate candidate;
   candidate.fit =
       fit_lens(views, lens, seeds.front(), {.solve_warp = options.solve_warp, .seed = options.seed});
-  candidate.covariance = lens_covariance(views, candidate.fit);
+  candidate.covariance = covariance_of(views, candidate.fit);
   return candidate;
 }
 

@@ -60,18 +60,49 @@ INSTANTIATE_TEST_SUITE_P(All, LensModels,
                                          "LENSMODEL_OPENCV12", "LENSMODEL_CAHVOR",
                                          "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=8_Ny=6_fov_x_deg=90"));
 
-// 130 degrees: the spline fits, and says itself that the rim, where few corners are, is known less.
-TEST(Calibration, ASplineKnowsAWideLensLessAtItsRim) {
-  TestRng rng;
+// 130 degrees, and what a spline says of itself against how far it is off, in the middle and at the rim of
+// the picture, where it knows less.
+TEST(Calibration, ASplineKnowsHowFarAWideLensIsOffAtItsRim) {
+  constexpr int kColumns = 15, kRows = 11, kSeeds = 3;
   const double f = 320 / (2 * std::tan(130 * kRadFromDeg / 4));
   const CameraModel camera("LENSMODEL_STEREOGRAPHIC", {f, f, 319.5, 239.5}, 640, 480);
-  const BoardViews views = synthetic_boards(
-      camera, {.noise_px = 0.1, .views = 40, .nearest = 0.2, .farthest = 0.4, .keep_partial = true}, rng);
-  const Candidate found = once(views, "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=10_Ny=8_fov_x_deg=150");
-  EXPECT_LT(off_by(camera, found.fit.model()), 0.5);
-  const SensorMap map = uncertainty_map(found.fit, found.covariance, kAtInfinity, 9, 7);
-  EXPECT_LT(map.at(4, 3), 0.3);
-  EXPECT_GT(map.at(0, 0), 2 * map.at(4, 3));
+  TestRng rng;
+  struct Part {
+    double off = 0, predicted = 0, count = 0;  // squares, px^2
+    double ratio() const { return std::sqrt(off / predicted); }
+  } middle, rim;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const BoardViews views = synthetic_boards(
+        camera, {.noise_px = 0.1, .views = 40, .nearest = 0.2, .farthest = 0.4, .keep_partial = true}, rng);
+    const Candidate found = once(views, "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=10_Ny=8_fov_x_deg=150");
+    EXPECT_LT(off_by(camera, found.fit.model()), 0.5);
+    const auto covered = covered_places(views, kColumns, kRows);
+    const SensorMap map = uncertainty_map(found.fit, found.covariance, kAtInfinity, kColumns, kRows);
+    std::vector<double> weight;
+    for (size_t i = 0; i < covered.size(); ++i)
+      weight.push_back(covered[i] ? 1 / (map.values[i] * map.values[i]) : 0);
+    const ModelDifference off = model_difference(camera, found.fit.model(), kColumns, kRows, weight);
+    for (int row = 0; row < kRows; ++row) {
+      for (int column = 0; column < kColumns; ++column) {
+        if (!covered[static_cast<size_t>(row * kColumns + column)]) continue;
+        const bool outer = row < 2 || row > kRows - 3 || column < 2 || column > kColumns - 3;
+        Part& part = outer ? rim : middle;
+        part.off += std::pow(off.length.at(column, row), 2);
+        part.predicted += std::pow(map.at(column, row), 2);
+        part.count += 1;
+      }
+    }
+  }
+  for (const auto& [name, part] : {std::pair("middle", middle), std::pair("rim", rim)}) {
+    std::cout << name << ": " << std::sqrt(part.off / part.count) << " px off, "
+              << std::sqrt(part.predicted / part.count) << " px predicted\n";
+  }
+  EXPECT_GT(rim.predicted / rim.count, 1.5 * middle.predicted / middle.count);
+  // The worst direction is predicted, both are off; and three lenses scatter.
+  for (const Part& part : {middle, rim}) {
+    EXPECT_GT(part.ratio(), 0.4);
+    EXPECT_LT(part.ratio(), 1.6);
+  }
 }
 
 TEST(Calibration, FindsThePictureWhoseCornersAreWrong) {
@@ -96,24 +127,25 @@ TEST(Calibration, SaysThatParallelBoardsDoNotTellTheFocalLength) {
       corner.pixel += Eigen::Vector2d(0.2 * rng.normal() + k, 0.2 * rng.normal());
   }
   // Either there is no solution, or it comes with that sentence.
+  std::string said;
   try {
-    const Candidate found = once(views, "LENSMODEL_OPENCV4");
-    EXPECT_THAT(what_is_missing(views, found.fit), Contains(HasSubstr("focal length")));
+    for (const std::string& missing : what_is_missing(views, once(views, "LENSMODEL_OPENCV4").fit))
+      said += missing;
   } catch (const CalibrationError& e) {
-    EXPECT_STRNE(e.what(), "");
+    said = e.what();
   }
+  EXPECT_THAT(said, HasSubstr("the focal length cannot be told from the distance"));
 }
 
-TEST(Calibration, OfOnePictureNothingIsCalledGood) {
+TEST(Calibration, RefusesOnePicture) {
   TestRng rng;
   const BoardViews views = synthetic_boards(opencv4_camera(), {.views = 1}, rng);
   try {
-    const Calibration calibration = calibrate_camera(views, only("LENSMODEL_OPENCV4"));
-    const Verdict verdict = judge(views, calibration, sharp_target());
-    EXPECT_TRUE(std::ranges::any_of(verdict.gates, [](const Gate& gate) { return !gate.met; }));
-    EXPECT_THAT(verdict.missing, Contains(HasSubstr("There are 1 pictures")));
+    calibrate_camera(views, only("LENSMODEL_OPENCV4"));
+    FAIL();
   } catch (const CalibrationError& e) {
-    EXPECT_STRNE(e.what(), "");
+    EXPECT_THAT(e.what(), HasSubstr("expected 3 pictures of the board at least, found 1"));
+    EXPECT_THAT(e.what(), HasSubstr("focal length and distance undecided"));
   }
 }
 
@@ -200,11 +232,10 @@ TEST(Requirements, AreHeldAgainstTheCalibration) {
     EXPECT_THROW(parse_requirements(wrong), CalibrationError) << wrong;
 }
 
-// Answers of N seeds are spread as the covariance says: 20 % is 2.8 standard errors of 100. Of few seeds, as
-// run every time, a tenth of that accuracy: a chi squared of 8 N, whose errors hang together by 3 or so.
+// Answers of N seeds are spread as the covariance says. PERCH_CALIBRATION_SEEDS=100 takes more.
 TEST(Calibration, ItsSigmaIsTheSpreadOfItsAnswers) {
   const char* seeds = std::getenv("PERCH_CALIBRATION_SEEDS");
-  const int count = seeds ? std::max(10, std::atoi(seeds)) : 10;
+  const int count = seeds ? std::max(40, std::atoi(seeds)) : 40;
   TestRng rng;
   const CameraModel camera = opencv4_camera();
   Eigen::Array<double, 8, 1> squares = Eigen::Array<double, 8, 1>::Zero();
@@ -224,9 +255,10 @@ TEST(Calibration, ItsSigmaIsTheSpreadOfItsAnswers) {
             << ratio.mean() << "; " << within << " of " << 8 * count << " within 3 sigma\n";
   // 0.3 % of a normal distribution are beyond 3 sigma; parameters of one solve go there together.
   EXPECT_GE(within, 8 * count - std::max(4, 8 * count / 100));
-  EXPECT_NEAR(ratio.mean(), 1, seeds ? 0.2 : 0.4);
-  // 20 %, and what a deviation of 100 scatters: 7 %.
-  EXPECT_LT((ratio - 1).abs().maxCoeff(), seeds ? 0.25 : 1);
+  // A deviation of 40 scatters by 11 %, the worst of eight by twice that and more; the mean of 8 that hang
+  // together by threes by 7 %.
+  EXPECT_NEAR(ratio.mean(), 1, 0.2);
+  EXPECT_LT((ratio - 1).abs().maxCoeff(), 0.45);
 }
 
 }  // namespace
