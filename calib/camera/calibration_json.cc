@@ -1,5 +1,6 @@
 #include "calib/camera/calibration_json.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -91,6 +92,10 @@ std::string calibration_json_text(const BoardViews& views, const Calibration& ca
                         {"outliers", suspect.outliers},
                         {"why", suspect.why}});
   }
+  const Json views_found = views_json(views, calibration.fit());
+  const auto worst = std::max_element(
+      views_found.begin(), views_found.end(),
+      [](const Json& a, const Json& b) { return a["rms_px"].get<double>() < b["rms_px"].get<double>(); });
   const Json json = {
       {"summary", verdict.summary},
       {"width", views.width},
@@ -112,8 +117,9 @@ std::string calibration_json_text(const BoardViews& views, const Calibration& ca
       {"warnings", verdict.warnings},
       {"remarks", calibration.remarks},
       {"suspects", suspects},
+      {"worst_picture", (*worst)["picture"]},
       {"candidates", candidates},
-      {"views", views_json(views, calibration.fit())}};
+      {"views", views_found}};
   // A file's name need not be UTF-8.
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -239,20 +239,26 @@ void Search::leave_out_blurred() {
   });
 }
 
-// What the pictures show in place of the chessboard that was asked for.
+// What most of a few pictures show in place of the chessboard that was asked for: in one of them something
+// beside the board may look like a row more.
 std::string Search::what_else(const std::vector<LeftOut>& without) const {
   if (!std::holds_alternative<Chessboard>(board_.pattern)) return {};
+  std::map<std::pair<int, int>, std::vector<std::string>> pictures_by_size;
   int tried = 0;
   for (const LeftOut& one : without) {
     Frame frame;
     read_picture(one.picture, Channel::kGrey, frame);
-    if (!frame.problem.empty() || ++tried > 5) continue;
+    if (!frame.problem.empty()) continue;
+    if (++tried > 5) break;
     const cv::Size size = chessboard_in(frame.grey);
-    if (size.width < 3) continue;
-    return "; " + one.picture + " shows one of " + size_text(size.width, size.height) +
-           " inner corners (a board has one less each way than squares)";
+    if (size.width >= 3) pictures_by_size[{size.width, size.height}].push_back(one.picture);
   }
-  return {};
+  const auto most =
+      std::max_element(pictures_by_size.begin(), pictures_by_size.end(),
+                       [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  if (most == pictures_by_size.end()) return {};
+  return "; " + most->second.front() + " shows one of " + size_text(most->first.first, most->first.second) +
+         " inner corners (a board has one less each way than squares)";
 }
 
 void Search::show() const {
@@ -283,9 +289,12 @@ FoundBoards Search::result() {
   if (!any) {
     const std::string pictures =
         kept_.size() == 1 ? "the only picture" : "none of " + std::to_string(kept_.size()) + " pictures";
-    std::string reason = kept_.empty() ? ""
-                                       : " (" + kept_.front().board.picture + ": " +
-                                             kept_.front().board.sighting.problem + ")";
+    std::string reason;
+    if (!kept_.empty()) {
+      // What cannot be read is named in its problem.
+      const auto& [picture, width, height, sighting] = kept_.front().board;
+      reason = " (" + (sighting.problem.starts_with(picture) ? "" : picture + ": ") + sighting.problem + ")";
+    }
     std::vector<LeftOut> all;
     for (const Looked& one : kept_) all.push_back({one.board.picture, one.board.sighting.problem});
     throw std::runtime_error(board_.text + ": not found, in " + pictures + reason + what_else(all));

@@ -3,10 +3,14 @@
 
 #include <gflags/gflags.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cmath>
 #include <csignal>
+#include <cstring>
+#include <filesystem>
 #include <iostream>
 #include <sstream>
 #include <thread>
@@ -109,6 +113,14 @@ LandingTarget landing_target(const Board& board) {
   return read_target(Section::parse(kSharp, "sharp.yaml"));
 }
 
+// Said before the work of minutes, not after it.
+void check_writable(const char* flag, const std::string& file) {
+  if (file.empty()) return;
+  const std::filesystem::path parent = std::filesystem::absolute(file).parent_path();
+  if (access(parent.c_str(), W_OK) != 0)
+    throw std::runtime_error(std::string(flag) + ": " + parent.string() + ": " + std::strerror(errno));
+}
+
 void check_flags(const CommandLine& line) {
   if (FLAGS_live.empty() == line.arguments.empty()) throw UsageError("expected pictures, or --live and none");
   if (FLAGS_frames < 3) throw UsageError("--frames: expected 3 or more");
@@ -118,6 +130,10 @@ void check_flags(const CommandLine& line) {
   const bool writes =
       !FLAGS_json.empty() || !FLAGS_report.empty() || !FLAGS_zoom_table.empty() || !FLAGS_require.empty();
   if (FLAGS_output.empty() && writes) throw UsageError("--output: expected the file for the camera model");
+  check_writable("--output", FLAGS_output);
+  check_writable("--json", FLAGS_json);
+  check_writable("--report", FLAGS_report);
+  check_writable("--zoom-table", FLAGS_zoom_table);
 }
 
 void tell(const FoundBoards& found) {
@@ -126,8 +142,8 @@ void tell(const FoundBoards& found) {
   for (const std::string& remark : found.remarks) std::cerr << remark << '\n';
   size_t corners = 0;
   for (const BoardView& view : found.views.views) corners += view.corners.size();
-  std::cout << found.views.views.size() << " pictures of " << found.views.width << "x" << found.views.height
-            << " with " << corners << " corners\n";
+  std::cout << found.views.views.size() << (found.views.views.size() == 1 ? " picture of " : " pictures of ")
+            << found.views.width << "x" << found.views.height << " with " << corners << " corners\n";
 }
 
 // A landing target of squares is measured through the lens: once it is known roughly, it is measured again.

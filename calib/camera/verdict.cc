@@ -153,6 +153,11 @@ void look_at_rows(const BoardViews& views, const LensFit& fit, Verdict& verdict)
 }
 
 void look_at_board(const BoardViews& views, const Candidate& best, Verdict& verdict) {
+  // Millimetres, most likely.
+  if (views.grid.spacing > 1) {
+    verdict.warnings.push_back("The board's corners are " + length(views.grid.spacing) +
+                               " apart: is that the spacing in metres?");
+  }
   const double size = std::max(views.grid.columns, views.grid.rows) * views.grid.spacing;
   const double bend = best.fit.warp.cwiseAbs().maxCoeff();
   if (bend > 0.01 * size) {

@@ -43,7 +43,11 @@ TEST(PerchCalibrateCamera, RefusesWhatItCannotDo) {
   }
   const Outcome no_picture = run(folder, "--board 9x6 --spacing 0.02 a.png");
   EXPECT_EQ(no_picture.code, 1);
-  EXPECT_THAT(no_picture.err, HasSubstr("perch-calibrate-camera: "));
+  EXPECT_THAT(no_picture.err, HasSubstr("in the only picture (a.png: "));
+  // Before any picture is looked at.
+  const Outcome nowhere = run(folder, "--board 9x6 --spacing 0.02 --output none/o.cameramodel a.png");
+  EXPECT_EQ(nowhere.code, 1);
+  EXPECT_THAT(nowhere.err, testing::ContainsRegex("--output: .*/none: No such file"));
 }
 
 TEST(PerchCalibrateCamera, CalibratesFromRealPhotographs) {
@@ -64,7 +68,13 @@ TEST(PerchCalibrateCamera, CalibratesFromRealPhotographs) {
   EXPECT_THAT(outcome.err, HasSubstr("not met: uncertainty"));
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("not met: noise")));
   EXPECT_TRUE(std::filesystem::exists(folder / "cam.json"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "cam.html"));
+  // One of them fits worse than all others: 1.3 times the median. The report shows it first.
+  const auto json = nlohmann::json::parse(read_file(folder / "cam.json"));
+  EXPECT_EQ(json["worst_picture"], "left08.jpg");
+  const std::string page = read_file(folder / "cam.html");
+  const size_t first = page.find("left", page.find("Pictures that fit worst"));
+  ASSERT_NE(first, std::string::npos);
+  EXPECT_EQ(page.substr(first, 10), "left08.jpg");
   EXPECT_THAT(outcome.out, HasSubstr("13 pictures of 640x480 with 702 corners"));
   const CameraModel model = read_camera_model(folder / "cam.cameramodel");
   // mrcal-calibrate-cameras: 533.9; one deviation of it is about 1.
