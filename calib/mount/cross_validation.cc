@@ -1,5 +1,7 @@
 #include "calib/mount/cross_validation.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Dense>
 #include <cmath>
 
@@ -103,8 +105,8 @@ PadScatter pad_scatter(const MountProblem& problem, const MountSolution& solutio
 }
 
 std::vector<HeldOut> cross_validate(const MountProblem& problem, const MountSolution& solution) {
-  std::vector<HeldOut> all;
-  for (size_t part = 0; part < kParts; ++part) all.push_back(without(problem, solution, part));
+  std::vector<HeldOut> all(kParts);
+  tbb::parallel_for(size_t{0}, kParts, [&](size_t part) { all[part] = without(problem, solution, part); });
   return all;
 }
 

@@ -34,7 +34,8 @@ struct HeldOut {
   std::vector<PadScatter> within, beyond;  // a flight: of the pictures it was found from, and the others
 };
 
-// Each flight in nine pieces of time; every third piece is held out, three times.
+// Each flight in nine pieces of time; every third piece is held out, three times. The parts are
+// solved side by side.
 std::vector<HeldOut> cross_validate(const MountProblem& problem, const MountSolution& solution);
 
 }  // namespace perch

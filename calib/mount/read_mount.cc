@@ -1,8 +1,11 @@
 #include "calib/mount/read_mount.h"
 
 #include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
+#include <atomic>
 #include <memory>
+#include <utility>
 
 #include "perch/camera/image_source.h"
 #include "perch/estimator/estimator.h"
@@ -55,12 +58,21 @@ CameraModel camera_of(const RunConfig& config, const Flight& flight) {
                            "or mav0/cam0/camera.cameramodel or sensor.yaml in the flight");
 }
 
-std::optional<Sighting> sighting_of(const Estimate& estimate, const LandingTarget& target, size_t frame) {
+// Each picture helps the detector with the next, so that pictures are taken in order; but a flight of minutes
+// in pieces of this many, side by side. Ten seconds: the search of a whole picture at each beginning is
+// nothing, and the pieces are the same on every machine, so that the result is.
+constexpr size_t kStretch = 300;
+
+struct Stretch {
+  std::vector<Frame> frames;
+  std::vector<std::optional<Sighting>> sightings;
+};
+
+std::optional<Sighting> sighting_of(const Estimate& estimate, const LandingTarget& target) {
   const bool ok = estimate.status == EstimateStatus::kOk;
   if (!ok && estimate.status != EstimateStatus::kAmbiguous) return std::nullopt;
   Sighting sight;
   sight.timestamp_ns = estimate.timestamp_ns;
-  sight.frame = frame;
   if (ok) sight.camera_from_target = estimate.camera_from_target;
   for (const Correspondence& c : estimate.correspondences) {
     const Eigen::Vector2d& p = target.features[static_cast<size_t>(c.feature)].point;
@@ -114,31 +126,46 @@ ReadFlight read_mount_flight(const RunConfig& config, const std::filesystem::pat
   result.body_from_camera = flight.body_from_camera;
   const CameraModel camera = camera_of(config, flight);
   result.flight = {flight.name, camera, {}, flight.nav, flight.gimbal};
-  Estimator estimator(config, camera);
   const auto source = open_image_source("flight:" + folder.string(), config.channel);
-  using FramePtr = std::shared_ptr<Frame>;
-  bool stop = false;
+  std::atomic<bool> stop = false;
+  using StretchPtr = std::shared_ptr<Stretch>;
   tbb::parallel_pipeline(
-      16, tbb::make_filter<void, FramePtr>(tbb::filter_mode::serial_in_order,
-                                           [&](tbb::flow_control& flow) -> FramePtr {
-                                             auto frame = std::make_shared<Frame>();
-                                             if (!stop && source->advance(*frame)) return frame;
-                                             flow.stop();
-                                             return nullptr;
-                                           }) &
-              tbb::make_filter<FramePtr, FramePtr>(tbb::filter_mode::parallel,
-                                                   [&](FramePtr frame) {
-                                                     source->read(*frame);
-                                                     return frame;
-                                                   }) &
-              tbb::make_filter<FramePtr, void>(tbb::filter_mode::serial_in_order, [&](const FramePtr& frame) {
-                Estimator::Aid aid;
-                aid.angles = head_angles_at(flight.gimbal, frame->timestamp_ns);
-                const Estimate estimate = estimator.process(*frame, aid);
-                if (auto sight = sighting_of(estimate, config.target, result.pictures))
-                  result.flight.sightings.push_back(std::move(*sight));
-                stop = !go_on(++result.pictures);
-              }));
+      2 * static_cast<size_t>(tbb::this_task_arena::max_concurrency()),
+      tbb::make_filter<void, StretchPtr>(tbb::filter_mode::serial_in_order,
+                                         [&](tbb::flow_control& flow) -> StretchPtr {
+                                           auto stretch = std::make_shared<Stretch>();
+                                           Frame frame;
+                                           while (!stop && stretch->frames.size() < kStretch &&
+                                                  source->advance(frame))
+                                             stretch->frames.push_back(std::exchange(frame, {}));
+                                           if (!stretch->frames.empty()) return stretch;
+                                           flow.stop();
+                                           return nullptr;
+                                         }) &
+          tbb::make_filter<StretchPtr, StretchPtr>(
+              tbb::filter_mode::parallel,
+              [&](StretchPtr stretch) {
+                Estimator estimator(config, camera);
+                for (Frame& frame : stretch->frames) {
+                  if (stop) break;
+                  source->read(frame);
+                  Estimator::Aid aid;
+                  aid.angles = head_angles_at(flight.gimbal, frame.timestamp_ns);
+                  stretch->sightings.push_back(sighting_of(estimator.process(frame, aid), config.target));
+                  frame.grey.release();
+                }
+                return stretch;
+              }) &
+          tbb::make_filter<StretchPtr, void>(tbb::filter_mode::serial_in_order,
+                                             [&](const StretchPtr& stretch) {
+                                               for (auto& sight : stretch->sightings) {
+                                                 if (sight) {
+                                                   sight->frame = result.pictures;
+                                                   result.flight.sightings.push_back(std::move(*sight));
+                                                 }
+                                                 if (!go_on(++result.pictures)) stop = true;
+                                               }
+                                             }));
   std::sort(result.flight.sightings.begin(), result.flight.sightings.end(),
             [](const Sighting& a, const Sighting& b) { return a.timestamp_ns < b.timestamp_ns; });
   result.problems = flight.problems;
