@@ -129,10 +129,7 @@ std::vector<HandEyePair> hand_eye_pairs(const MountProblem& problem, const Mount
 FlightStart start_flight(const MountProblem& problem, const MountFlight& flight) {
   check_times(problem, flight);
   check_motion(flight);
-  FlightStart start = best_offset(problem, flight, Trajectory(flight.nav, usual_half_window(flight.nav)));
-  // Navigation that is exact at its samples, and jumps between them, is not smoothed.
-  FlightStart joined = best_offset(problem, flight, Trajectory(flight.nav, 0));
-  if (joined.hand_eye.misfit < 0.7 * start.hand_eye.misfit) start = std::move(joined);
+  const FlightStart start = best_offset(problem, flight, Trajectory(flight.nav));
   if (start.costs.empty()) {
     throw MountError(flight.name + ": fewer than 4 pictures of the target lie within navigation's time");
   }

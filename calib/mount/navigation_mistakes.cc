@@ -67,11 +67,9 @@ std::string usual_mistake(const MountProblem& problem, const MountFlight& flight
   std::string best;
   double least = start.hand_eye.misfit / 3;  // much better, or it is none
   for (const Mistake& mistake : mistakes()) {
-    NavTrack nav = flight.nav;
-    for (NavSample& s : nav.samples) s.world_from_body = mistake.apply(s.world_from_body);
-    const Trajectory changed(nav, 0);
     for (const double near : {-0.1, 0.0, 0.1}) {
-      const auto pairs = hand_eye_pairs(problem, flight, changed, problem.nominal_offset + near, 150);
+      auto pairs = hand_eye_pairs(problem, flight, start.trajectory, problem.nominal_offset + near, 150);
+      for (HandEyePair& pair : pairs) pair.world_from_body = mistake.apply(pair.world_from_body);
       const HandEye eye = solve_hand_eye(pairs, problem.nominal_mount);
       if (eye.misfit < least) {
         least = eye.misfit;

@@ -11,7 +11,8 @@ namespace {
 // Below these no navigation is worth its digits; they keep the weights finite.
 constexpr double kLeastPosition = 2e-4;                 // m
 constexpr double kLeastRotation = 0.005 * kRadFromDeg;  // rad
-// Errors this close in time are the trajectory's window, not drift; this far, drift of GPS has hardly moved.
+// Drift is what errors this far apart have in common: closer, they may be of the vehicle's motion between
+// samples, and of the same samples.
 constexpr double kShort = 0.3, kLong = 1.0;  // s
 
 double median(std::vector<double> values) {
@@ -27,8 +28,12 @@ struct Part {
   double drift_time = 0;      // s
 };
 
-// Of position (first = 0) or rotation (first = 3).
-Part measure(const NoiseSamples& s, Eigen::Index first) {
+// How long the curve remembers a sample: as many steps as it averages samples.
+double memory_of(const Trajectory& trajectory, double noise_part) { return trajectory.step() / noise_part; }
+
+// Of position (first = 0) or rotation (first = 3); `memory` in s.
+Part measure(const NoiseSamples& s, Eigen::Index first, double memory) {
+  const double nearest = std::max(kShort, memory), unit = std::max(kLong, 3 * nearest);
   std::vector<double> sizes, camera;
   for (size_t i = 0; i < s.errors.size(); ++i) {
     for (Eigen::Index k = first; k < first + 3; ++k) {
@@ -60,30 +65,30 @@ Part measure(const NoiseSamples& s, Eigen::Index first) {
       ++*count;
     }
   };
-  constexpr int kBins = 8;  // 0.3, 1, 2, 4, ... 128 s
+  constexpr int kBins = 8;  // mostly 0.3, 1, 2, 4, ... 128 s
   double sums[kBins] = {};
   int counts[kBins] = {};
   const size_t step = std::max<size_t>(1, s.times.size() / 1500);
   for (size_t i = 0; i < s.times.size(); i += step) {
     for (size_t j = i + 1; j < s.times.size(); j += step) {
       const double lag = s.times[j] - s.times[i];
-      if (lag < kShort) continue;
-      const int bin = lag < kLong ? 0 : 1 + static_cast<int>(std::log2(lag / kLong));
+      if (lag < nearest) continue;
+      const int bin = lag < unit ? 0 : 1 + static_cast<int>(std::log2(lag / unit));
       if (bin < kBins) product(i, j, &sums[bin], &counts[bin]);
     }
   }
   if (counts[0] < 60) return part;
   const double lasting = sums[0] / counts[0];
   const double span = s.times.back() - s.times.front();
-  // What chance makes of errors that forget themselves within the window.
-  const double independent = 3 * std::min(n / 3, span / 0.25);
+  // What chance makes of errors that forget themselves within that.
+  const double independent = 3 * std::min(n / 3, span / std::max(0.25, memory));
   if (lasting < 0.15 * all || lasting < 3 * all / std::sqrt(independent)) return part;
   part.drift_variance = lasting;
   part.drift_time = span / 2;
   for (int bin = 1; bin < kBins; ++bin) {
     if (counts[bin] == 0) break;
     if (sums[bin] / counts[bin] > lasting / M_E) continue;
-    part.drift_time = std::max(0.5, kLong * std::pow(2, bin - 1));
+    part.drift_time = std::max(0.5, unit * std::pow(2, bin - 1));
     break;
   }
   return part;
@@ -126,13 +131,16 @@ NavigationNoise first_noise(const NavigationNoise& given, const Trajectory& traj
 
 NavigationNoise measured_noise(const NavigationNoise& given, const Trajectory& trajectory,
                                const NoiseSamples& samples) {
-  const Part position = measure(samples, 0), rotation = measure(samples, 3);
-  double part = 0;
-  for (const double p : samples.noise_part) part += p / static_cast<double>(samples.noise_part.size());
-  part = part > 0 ? part : 1;
+  Vector6d part = Vector6d::Zero();
+  for (const Vector6d& p : samples.noise_part) part += p / static_cast<double>(samples.noise_part.size());
+  if (samples.noise_part.empty()) part.setOnes();
+  const Part position = measure(samples, 0, memory_of(trajectory, part[0])),
+             rotation = measure(samples, 3, memory_of(trajectory, part[3]));
   NavigationNoise noise;
-  split(position, trajectory.position_noise(), part, kLeastPosition, &noise.position, &noise.position_drift);
-  split(rotation, trajectory.rotation_noise(), part, kLeastRotation, &noise.rotation, &noise.rotation_drift);
+  split(position, trajectory.position_noise(), part[0], kLeastPosition, &noise.position,
+        &noise.position_drift);
+  split(rotation, trajectory.rotation_noise(), part[3], kLeastRotation, &noise.rotation,
+        &noise.rotation_drift);
   noise.drift_time = std::max(position.drift_time, rotation.drift_time);
   if (noise.drift_time <= 0) noise.drift_time = 0.2;  // what is left over has no memory worth the name
   keep_given(given.position, &noise.position);

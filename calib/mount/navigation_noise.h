@@ -9,10 +9,11 @@ namespace perch {
 
 // Navigation minus vision over a flight, in the world.
 struct NoiseSamples {
-  std::vector<double> times;  // s
+  std::vector<size_t> pictures;  // the flight's sightings
+  std::vector<double> times;     // s
   std::vector<PoseError> errors;
   std::vector<Vector6d> camera_variance;  // what vision's own covariance makes of them
-  std::vector<double> noise_part;         // TrajectoryPoint's
+  std::vector<Vector6d> noise_part;       // TrajectoryPoint's
 };
 
 // Before anything is fitted: generous.

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "calib/mount/mount_covariance.h"
-#include "calib/mount/navigation_noise.h"
 #include "perch/flight/head_angles.h"
 #include "perch/geometry/euler.h"
 
@@ -33,13 +32,11 @@ bool is_inside(const MountProblem& problem, const MountFlight& flight, const Tra
   return true;
 }
 
-Matrix6d navigation_covariance(const NavigationNoise& noise, double part) {
-  Vector6d variance;
-  variance.head<3>().setConstant(noise.position * noise.position * part +
-                                 noise.position_drift * noise.position_drift);
-  variance.tail<3>().setConstant(noise.rotation * noise.rotation * part +
-                                 noise.rotation_drift * noise.rotation_drift);
-  return variance.asDiagonal();
+Matrix6d navigation_covariance(const NavigationNoise& noise, const Vector6d& part) {
+  Vector6d white, drift;
+  white << Eigen::Vector3d::Constant(noise.position), Eigen::Vector3d::Constant(noise.rotation);
+  drift << Eigen::Vector3d::Constant(noise.position_drift), Eigen::Vector3d::Constant(noise.rotation_drift);
+  return (part.cwiseProduct(white.cwiseAbs2()) + drift.cwiseAbs2()).asDiagonal();
 }
 
 std::optional<SightPrediction> predict(const MountProblem& problem, const MountSolution& solution, size_t f,
@@ -294,6 +291,27 @@ std::vector<std::optional<PoseError>> navigation_errors(const MountProblem& prob
   return errors;
 }
 
+NoiseSamples noise_samples(const MountProblem& problem, const MountSolution& solution, size_t f) {
+  const MountFlight& flight = problem.flights[f];
+  const auto errors = navigation_errors(problem, flight, solution.flights[f], solution.state, f);
+  NoiseSamples samples;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    if (!errors[i]) continue;
+    const auto p = predict(problem, solution, f, i);
+    if (!p) continue;
+    const Sighting& sight = flight.sightings[i];
+    const Matrix6d back = p->by_correction.inverse();
+    samples.pictures.push_back(i);
+    samples.times.push_back(1e-9 *
+                            static_cast<double>(sight.timestamp_ns - flight.sightings[0].timestamp_ns));
+    samples.errors.push_back(*errors[i]);
+    samples.camera_variance.push_back(
+        (back * sight.camera_from_target->covariance * back.transpose()).diagonal());
+    samples.noise_part.push_back(p->noise_part);
+  }
+  return samples;
+}
+
 void pose_gate(MountProblem& problem, MountSolution& solution) {
   for (size_t f = 0; f < solution.flights.size(); ++f) {
     FlightFit& fit = solution.flights[f];
@@ -303,22 +321,7 @@ void pose_gate(MountProblem& problem, MountSolution& solution) {
     fit_poses(problem, solution, round > 0);
     for (size_t f = 0; f < problem.flights.size(); ++f) {
       FlightFit& fit = solution.flights[f];
-      NoiseSamples samples;
-      const auto errors = navigation_errors(problem, problem.flights[f], fit, solution.state, f);
-      for (size_t i = 0; i < errors.size(); ++i) {
-        if (!errors[i]) continue;
-        const auto p = predict(problem, solution, f, i);
-        if (!p) continue;
-        const Matrix6d back = p->by_correction.inverse();
-        samples.times.push_back(1e-9 * static_cast<double>(problem.flights[f].sightings[i].timestamp_ns -
-                                                           problem.flights[f].sightings[0].timestamp_ns));
-        samples.errors.push_back(*errors[i]);
-        samples.camera_variance.push_back(
-            (back * problem.flights[f].sightings[i].camera_from_target->covariance * back.transpose())
-                .diagonal());
-        samples.noise_part.push_back(p->noise_part);
-      }
-      fit.noise = measured_noise(problem.options.noise, fit.trajectory, samples);
+      fit.noise = measured_noise(problem.options.noise, fit.trajectory, noise_samples(problem, solution, f));
     }
   }
   choose(problem, solution);

@@ -3,6 +3,7 @@
 #include <ceres/problem.h>
 
 #include "calib/mount/mount_solver.h"
+#include "calib/mount/navigation_noise.h"
 #include "calib/mount/sight_cost.h"
 
 namespace perch {
@@ -43,5 +44,8 @@ void pose_gate(MountProblem& problem, MountSolution& solution);
 std::vector<std::optional<PoseError>> navigation_errors(const MountProblem& problem,
                                                         const MountFlight& flight, const FlightFit& fit,
                                                         const MountState& state, size_t f);
+
+// The same of the solution's state with what it is made of: pictures that have a pose and navigation.
+NoiseSamples noise_samples(const MountProblem& problem, const MountSolution& solution, size_t f);
 
 }  // namespace perch

@@ -37,7 +37,7 @@ struct SightPrediction {
   Matrix6d by_mount, by_pad, by_correction;
   Vector6d by_offset;
   Eigen::Matrix<double, 6, kHeadSize> by_head;
-  double noise_part = 1;  // TrajectoryPoint's
+  Vector6d noise_part = Vector6d::Ones();  // TrajectoryPoint's
 };
 
 struct SightInputs {

@@ -36,8 +36,9 @@ TrajectoryStates::TrajectoryStates(const Trajectory& trajectory, const Navigatio
     State state;
     state.time = 1e-9 * static_cast<double>(ns - camera_ns.front());
     const auto point = trajectory.at(ns - shift);
-    state.noise_part = std::max(point ? point->noise_part : 1,
-                                pictures_per_sample(camera_ns, trajectory.nav(), ns, ns - shift));
+    if (point) state.noise_part = point->noise_part;
+    state.noise_part =
+        state.noise_part.cwiseMax(pictures_per_sample(camera_ns, trajectory.nav(), ns, ns - shift));
     states_.push_back(state);
   }
 }
@@ -51,7 +52,7 @@ std::vector<CorrectionPart> TrajectoryStates::parts(size_t picture) {
 
 void TrajectoryStates::add_priors(ceres::Problem& problem) {
   for (State& state : states_) {
-    const Vector6d sigma = std::sqrt(state.noise_part) * six(noise_.position, noise_.rotation);
+    const Vector6d sigma = state.noise_part.cwiseSqrt().cwiseProduct(six(noise_.position, noise_.rotation));
     problem.AddResidualBlock(new StatePrior({1}, Vector6d::Zero(), sigma), nullptr, state.u.data());
   }
   if (!drifts_) return;

@@ -31,8 +31,8 @@ class TrajectoryStates {
 
  private:
   struct State {
-    double time = 0;        // s after the first picture
-    double noise_part = 1;  // of u's variance in that of a sample
+    double time = 0;                         // s after the first picture
+    Vector6d noise_part = Vector6d::Ones();  // of u's variance in that of a sample
     Vector6d u = Vector6d::Zero(), b = Vector6d::Zero();
   };
   NavigationNoise noise_;

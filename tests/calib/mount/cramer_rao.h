@@ -18,7 +18,7 @@ inline Eigen::MatrixXd cramer_rao_bound(MountWorld world, TestRng& rng) {
   world.position_noise = world.rotation_noise = 0;
   const MountProblem problem = world.problem(rng);
   const MountFlight& flight = problem.flights[0];
-  const Trajectory truth(flight.nav, usual_half_window(flight.nav));
+  const Trajectory truth(flight.nav);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(13, 13);
   for (const Sighting& sight : flight.sightings) {
     const auto p =

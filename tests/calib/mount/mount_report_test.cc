@@ -42,9 +42,7 @@ TEST(MountReport, HoldsWhatThePageShowsAndNothingBreaksOutOfIt) {
 
 TEST(CrossValidation, APartThatWasNotUsedIsPlacedAsTheOthersAre) {
   TestRng rng;
-  MountWorld world;
-  world.duration = 30;
-  world.camera_rate = 5;
+  MountWorld world = small_world();
   const MountProblem p = world.problem(rng);
   const MountSolution s = solve_mount(p);
   const auto held = cross_validate(p, s);

@@ -179,9 +179,7 @@ TEST(MountSolver, KnowsThatFewPicturesTellLess) {
 TEST(MountSolver, SaysWhatIsWrongWithTheNavigation) {
   const auto broken = [](auto change) {
     TestRng rng;
-    MountWorld world;
-    world.duration = 30;
-    world.camera_rate = 5;
+    MountWorld world = small_world();
     MountProblem p = world.problem(rng);
     for (NavSample& s : p.flights[0].nav.samples) change(s);
     return error_of(p);

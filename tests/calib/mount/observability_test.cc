@@ -23,9 +23,7 @@ const Untold* find(const std::vector<Untold>& all, const std::string& what) {
 
 TEST(Observability, AFlightWithAllMotionsTellsEverything) {
   TestRng rng;
-  MountWorld world;
-  world.duration = 30;
-  world.camera_rate = 5;
+  MountWorld world = small_world();
   const MountProblem p = world.problem(rng);
   EXPECT_TRUE(untold(solve_mount(p), p.options).empty());
 }
@@ -48,9 +46,7 @@ TEST(Observability, YawOnlyLeavesTheVerticalLeverArmUntold) {
 
 TEST(Observability, TranslationOnlyLeavesTheWholeLeverArmUntoldUnlessAPriorTellsIt) {
   TestRng rng;
-  MountWorld world;
-  world.duration = 30;
-  world.camera_rate = 5;
+  MountWorld world = small_world();
   world.roll_pitch = world.yaw_amplitude = 0;
   MountProblem p = world.problem(rng);
   const auto all = untold(solve_mount(p), p.options);
