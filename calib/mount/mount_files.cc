@@ -4,6 +4,8 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "calib/mount/observability.h"
+#include "calib/mount/wander.h"
 #include "perch/geometry/euler.h"
 #include "perch/geometry/so3.h"
 
@@ -140,7 +142,29 @@ std::string mount_yaml(const FrameChain& chain, const MountProblem& problem, con
   return text;
 }
 
-Json mount_json(const FrameChain& chain, const MountProblem& problem, const MountSolution& s) {
+namespace {
+
+Json scatter_json(const PadScatter& s) {
+  return {
+      {"pictures", s.count}, {"position_rms_m", s.position}, {"rotation_rms_deg", kDegFromRad * s.rotation}};
+}
+
+Json held_out_json(const HeldOut& part) {
+  if (!part.problem.empty()) return {{"problem", part.problem}};
+  Json json = {{"mount_moves_m", part.moved},
+               {"mount_turns_deg", kDegFromRad * part.turned},
+               {"mount_moves_sigmas", part.moved_sigmas}};
+  for (size_t f = 0; f < part.beyond.size(); ++f) {
+    json["pad_scatter"].push_back(
+        {{"used", scatter_json(part.within[f])}, {"held_out", scatter_json(part.beyond[f])}});
+  }
+  return json;
+}
+
+}  // namespace
+
+Json mount_json(const FrameChain& chain, const MountProblem& problem, const MountSolution& s,
+                const std::vector<HeldOut>& held_out) {
   const auto pose = [](const Rigid3& p) {
     const Eigen::Quaterniond q = positive_w(p.rotation);
     return Json{{"position_m", {p.translation.x(), p.translation.y(), p.translation.z()}},
@@ -176,6 +200,7 @@ Json mount_json(const FrameChain& chain, const MountProblem& problem, const Moun
                               {"rotation_sigma_deg", kDegFromRad * effect.rotation}});
   }
   for (const Untold& u : untold(s, problem.options)) json["untold"].push_back(in_words(u));
+  for (const HeldOut& part : held_out) json["held_out"].push_back(held_out_json(part));
   for (size_t f = 0; f < problem.flights.size(); ++f) {
     const FlightFit& fit = s.flights[f];
     Json flight = {{"name", problem.flights[f].name},
@@ -189,6 +214,10 @@ Json mount_json(const FrameChain& chain, const MountProblem& problem, const Moun
                                   {"position_drift_m", n.position_drift},
                                   {"rotation_drift_deg", kDegFromRad * n.rotation_drift},
                                   {"drift_time_s", n.drift_time}};
+    const Wander w = wander(problem, s, f);
+    flight["wander"] = {{"piece_s", w.piece}, {"position", w.position}, {"rotation", w.rotation}};
+    flight["pad_scatter"] = {{"before", scatter_json(pad_scatter(problem, s, f, s.start))},
+                             {"after", scatter_json(pad_scatter(problem, s, f, s.state))}};
     for (const auto& [key, errors] : {std::pair{"before", &fit.before}, std::pair{"after", &fit.after}}) {
       Vector6d sum = Vector6d::Zero(), squares = Vector6d::Zero();
       double n_used = 0;

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "calib/mount/observability.h"
+#include "calib/mount/cross_validation.h"
 
 namespace perch {
 
@@ -17,6 +17,6 @@ FrameChain calibrated_chain(const FrameChain& configured, const MountProblem& pr
 std::string mount_yaml(const FrameChain& chain, const MountProblem& problem, const MountSolution& solution);
 
 nlohmann::ordered_json mount_json(const FrameChain& chain, const MountProblem& problem,
-                                  const MountSolution& solution);
+                                  const MountSolution& solution, const std::vector<HeldOut>& held_out);
 
 }  // namespace perch

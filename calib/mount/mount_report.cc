@@ -4,6 +4,7 @@
 
 #include "calib/mount/mount_covariance.h"
 #include "calib/mount/observability.h"
+#include "calib/mount/wander.h"
 #include "perch/analysis/page.h"
 #include "perch/analysis/page_assets.h"
 #include "perch/geometry/euler.h"
@@ -96,6 +97,7 @@ Json flight_json(const MountProblem& problem, const MountSolution& s, size_t f) 
           {"pictures", flight.sightings.size()},
           {"used", used},
           {"offset_ms", number(1000 * offset)},
+          {"wander", in_words(wander(problem, s, f))},
           {"scatter_before", scatter(pad_scatter(problem, s, f, s.start))},
           {"scatter_after", scatter(pad_scatter(problem, s, f, s.state))},
           {"dc_before", six(dc_before)},

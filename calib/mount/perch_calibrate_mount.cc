@@ -13,7 +13,9 @@
 #include "calib/mount/cross_validation.h"
 #include "calib/mount/mount_files.h"
 #include "calib/mount/mount_report.h"
+#include "calib/mount/observability.h"
 #include "calib/mount/read_mount.h"
+#include "calib/mount/wander.h"
 #include "perch/analysis/pad_json.h"
 #include "perch/config/atomic_file.h"
 #include "perch/geometry/euler.h"
@@ -138,9 +140,14 @@ int run(const CommandLine& line) {
   print_result(problem, solution, held);
   const auto not_told = untold(solution, options);
   for (const Untold& u : not_told) std::cerr << "perch-calibrate-mount: " << in_words(u) << '\n';
+  for (size_t f = 0; f < problem.flights.size(); ++f) {
+    const std::string words = in_words(wander(problem, solution, f));
+    if (!words.empty())
+      std::cerr << "perch-calibrate-mount: " << problem.flights[f].name << ": " << words << '\n';
+  }
   const FrameChain chain = calibrated_chain(frames, problem, solution);
   if (!FLAGS_json.empty()) {
-    write_whole_file(FLAGS_json, mount_json(chain, problem, solution).dump(1) + "\n");
+    write_whole_file(FLAGS_json, mount_json(chain, problem, solution, held).dump(1) + "\n");
   }
   const std::string yaml = mount_yaml(chain, problem, solution);
   if (!FLAGS_report.empty()) {

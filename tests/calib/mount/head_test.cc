@@ -53,7 +53,7 @@ TEST(Head, FindsTheZerosToATwentiethOfADegreeAndTheLatencyToTwoMilliseconds) {
           *found.body_from_base * base_from_camera(found, angles),
           IsNearPose(*truth.body_from_base * base_from_camera(truth, angles), 0.1 * kRadFromDeg, 0.02));
     }
-    const auto json = mount_json(found, p, s);
+    const auto json = mount_json(found, p, s, {});
     EXPECT_NEAR(json["pan_tilt"]["tilt"]["zero_deg"].get<double>(), -2, 0.05);
     EXPECT_EQ(json["parameters"].size(), 13u + kHeadSize);
     const FrameChain read = read_frame_chain(Section::parse(mount_yaml(found, p, s), "mount.yaml"));

@@ -15,7 +15,8 @@ const scatterText = ([mm, deg]) => `${withUnit(mm, 'mm')}, ${withUnit(deg, '°')
 function lead(data) {
   const flights = data.flights.map((f) => `${f.name}: ${f.used} of ${f.pictures} pictures used, the pad as they place it scatters by ${scatterText(f.scatter_after)} RMS, with the mount of the start by ${scatterText(f.scatter_before)}.`);
   const told = data.untold.length ? 'The flights do not tell everything: no mount was written.' : 'The flights tell everything that was sought.';
-  return [element('p', {class: 'lead'}, told + ' ' + flights.join(' ')), ...data.untold.map((words) => element('p', {class: 'notice'}, words))];
+  return [element('p', {class: 'lead'}, told + ' ' + flights.join(' ')), ...data.untold.map((words) => element('p', {class: 'notice'}, words)),
+    ...data.flights.filter((f) => f.wander).map((f) => element('p', {class: 'notice'}, `${f.name}: ${f.wander}`))];
 }
 
 function tiles(data) {
@@ -81,7 +82,7 @@ function residualPlots(flight, key, draw) {
     return six;
   };
   return [
-    section('Navigation minus vision, calibrated', 'The body in the world’s axes. It should look like noise: waves are drift, steps a lost fix, a spread that grows with speed or turn rate a wrong clock.', grid(flight.after, 'vision', 190)),
+    section('Navigation minus vision, calibrated', 'The body in the world’s axes. It should look like noise: waves are drift, steps a lost fix, a spread that grows with speed or turn rate a wrong clock. What lasts for the whole flight is not here: it has gone into the pad’s place.', grid(flight.after, 'vision', 190)),
     section('The same before', 'With the mount, pad and clock that the search started from; mind the scales.', grid(flight.before, 'muted', 150)),
   ];
 }
