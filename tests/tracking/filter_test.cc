@@ -104,6 +104,25 @@ TEST_F(Filter, PredictsAlongTheMotionWithoutChangingAnything) {
   EXPECT_THAT(after->covariance, IsNearMatrix(before->covariance, 0.0));
 }
 
+TEST_F(Filter, TellsHowMuchAPoseSurprisesIt) {
+  EXPECT_FALSE(see(motion_.start)->innovation_squared);  // nothing was expected
+  follow(motion_);
+  for (const double off : {0.02, 1.0}) {  // believed, and not
+    const int64_t next = now_ + kFrame;
+    const VehicleState expected = *filter_.predict(next);
+    const UncertainRigid3 seen =
+        measured(perturb(motion_.at(next), (PoseError() << off, 0, 0, 0, off / 10, 0).finished()));
+    const auto state = filter_.update(now_ = next, seen);
+    ASSERT_TRUE(state->innovation_squared) << off;
+    const PoseCovariance covariance = expected.covariance.topLeftCorner<6, 6>() + seen.covariance;
+    const double squared =
+        normalised_error_squared(pose_error(expected.pad_from_body, seen.mean), covariance);
+    EXPECT_NEAR(*state->innovation_squared / squared, 1, 1e-9) << off;
+    EXPECT_EQ(state->source, off < 0.1 ? StateSource::kVision : StateSource::kPredicted);
+  }
+  EXPECT_FALSE(see_nothing()->innovation_squared);
+}
+
 // A body hanging upside down (a camera that looks down) that yaws to the left as seen from above the pad, z
 // up: its own z axis points down, so in its own axes the rate would be the opposite.
 TEST_F(Filter, AngularVelocityIsInTheAxesOfThePad) {

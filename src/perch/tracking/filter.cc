@@ -97,6 +97,7 @@ bool VehicleFilter::is_tracking(const Known& known, int64_t timestamp_ns) const 
 VehicleFilter::Known VehicleFilter::after(const Known& before, const Event& event) const {
   Known known = before;
   known.believed = false;
+  known.innovation_squared.reset();
   const bool tracking = is_tracking(before, event.timestamp_ns);
   if (tracking) {
     known.bank.propagate(seconds(before.timestamp_ns, event.timestamp_ns));
@@ -108,6 +109,7 @@ VehicleFilter::Known VehicleFilter::after(const Known& before, const Event& even
     return known;
   }
   if (tracking) {
+    known.innovation_squared = known.bank.surprise(*event.pad_from_body);
     known.believed = known.bank.see(*event.pad_from_body, options_.gate);
     known.refused = known.believed ? 0 : known.refused + 1;
   }
@@ -194,9 +196,11 @@ std::optional<VehicleState> VehicleFilter::update(int64_t timestamp_ns,
   if (const auto state = predict(timestamp_ns)) {
     last_state_ = state;
     const Known& known = known_at(timestamp_ns);
+    if (known.timestamp_ns == timestamp_ns) last_state_->innovation_squared = known.innovation_squared;
     if (known.believed && known.timestamp_ns == timestamp_ns) last_state_->source = StateSource::kVision;
   } else if (last_state_) {
     last_state_->timestamp_ns = timestamp_ns;
+    last_state_->innovation_squared.reset();
     last_state_->source = StateSource::kLost;
   }
   const auto history_ns = static_cast<int64_t>(options_.history * 1e9);

@@ -63,7 +63,8 @@ class VehicleFilter {
   struct Known {
     explicit Known(const TrackingOptions& options);
     bool tracking = false;
-    bool believed = false;  // the pose, when the event was one
+    bool believed = false;                     // the pose, when the event was one
+    std::optional<double> innovation_squared;  // of that pose, as it was expected
     int64_t timestamp_ns = 0;
     int64_t last_measured_ns = 0;
     int refused = 0;  // measured poses in a row

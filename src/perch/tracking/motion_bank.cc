@@ -106,6 +106,10 @@ bool MotionBank::see(const UncertainRigid3& pad_from_body, double gate) {
   return take([&](const Motion& motion) { return motion.of_pose(pad_from_body); }, gate, news_of_motion());
 }
 
+double MotionBank::surprise(const UncertainRigid3& pad_from_body) const {
+  return motion().surprise(motion().of_pose(pad_from_body)).squared;
+}
+
 void MotionBank::meet_world(const AutopilotSample& sample) {
   std::vector<Member> met;
   for (const Member& member : members_) {

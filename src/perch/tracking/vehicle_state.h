@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 
 #include "perch/geometry/rigid3.h"
 
@@ -18,6 +19,9 @@ struct VehicleState {
   // Of (d, r, dv, dw), the pose part as in geometry/uncertainty.h.
   Eigen::Matrix<double, 12, 12> covariance = Eigen::Matrix<double, 12, 12>::Zero();
   StateSource source = StateSource::kLost;
+  // The normalised innovation squared of the pose measured at this moment (6 degrees of freedom), believed or
+  // not; empty without one, and where tracking began with it.
+  std::optional<double> innovation_squared;
 };
 
 }  // namespace perch
