@@ -55,10 +55,14 @@ cv::Rect crop_about(const std::vector<Line>& lines, const cv::Size& size, const 
 }
 
 void draw_line(cv::Mat& shown, const View& view, const Line& line) {
-  std::vector<cv::Point> points;
-  for (const Eigen::Vector2d& pixel : line) points.push_back(view.shown(pixel));
-  cv::polylines(shown, points, false, kUnder, 4, cv::LINE_AA, kShift);
-  cv::polylines(shown, points, false, kOutline, 2, cv::LINE_AA, kShift);
+  std::vector<cv::Point> all, points;
+  for (const Eigen::Vector2d& pixel : line) all.push_back(view.shown(pixel));
+  // Most edges are straight to a sixteenth of a pixel, and each piece of a line costs as much as a long one.
+  const bool closed = all.size() > 1 && all.front() == all.back();
+  if (closed) all.pop_back();
+  cv::approxPolyDP(all, points, 1, closed);
+  cv::polylines(shown, points, closed, kUnder, 4, cv::LINE_AA, kShift);
+  cv::polylines(shown, points, closed, kOutline, 2, cv::LINE_AA, kShift);
 }
 
 void draw_measured(cv::Mat& shown, const View& view, const Correspondence& measured) {

@@ -50,7 +50,7 @@ class EdgeFit {
   void widen_on_ground(std::span<const uint8_t> on_ground);
   void find_blur(std::span<const EdgePiece> pieces, double expected_px);
 
-  StepTemplateTable templates_;
+  const StepTemplateTable& templates_ = StepTemplateTable::instance();
   std::vector<Piece> fitted_;
   std::vector<LevelSample> samples_;
   std::vector<WidthSample> widths_;

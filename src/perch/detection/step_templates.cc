@@ -54,6 +54,11 @@ StepTemplateTable::StepTemplateTable() {
   }
 }
 
+const StepTemplateTable& StepTemplateTable::instance() {
+  static const StepTemplateTable table;
+  return table;
+}
+
 const StepTemplates& StepTemplateTable::of(double reach, double* sigma) const {
   // The nearest in their logarithms.
   static const double half_step = std::sqrt(kBlurRatio);
