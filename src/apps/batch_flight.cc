@@ -10,6 +10,7 @@
 
 #include "flight_aids.h"
 #include "perch/analysis/error_table.h"
+#include "perch/analysis/frame_look.h"
 #include "perch/analysis/output_files.h"
 #include "perch/analysis/overlay.h"
 #include "perch/analysis/pad_json.h"
@@ -104,18 +105,32 @@ void forget_times(Estimate& estimate) {
 // Decodes in parallel and estimates in order: a frame's result depends on those before it, by the filter and
 // by what its picture deforms, to the last bit; so nothing but the order gives what one pass gives. Decoding
 // a picture takes some twenty times as long as estimating it.
-void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& estimator, FrameTables& tables,
-                     FlightResult& result) {
-  using FramePtr = std::shared_ptr<Frame>;
+void estimate_frames(const BatchFlight& job, ImageSource& source, const CameraModel& camera,
+                     Estimator& estimator, FrameTables& tables, FlightResult& result) {
+  struct Picture {
+    Frame frame;
+    GreyHistogram grey;
+  };
+  using PicturePtr = std::shared_ptr<Picture>;
   FlightAids aids(result.flight, result.chain, job.config);
-  const auto estimate_frame = [&](const FramePtr& frame) {
-    Estimate estimate = estimator.process(*frame, aids.at(frame->timestamp_ns));
+  const auto frames = static_cast<double>(std::max<int64_t>(1, source.size()));
+  const TargetViewer viewer(job.config.target);
+  const auto estimate_frame = [&](const PicturePtr& picture) {
+    const Frame& frame = picture->frame;
+    Estimate estimate = estimator.process(frame, aids.at(frame.timestamp_ns));
     if (!job.times) forget_times(estimate);
     tables.add(estimate);
+    result.greys.push_back(picture->grey);
+    result.looks.emplace_back();
+    if (estimate.status == EstimateStatus::kOk) {
+      const auto zoomed = zoomed_model(job.config, result.flight, frame.timestamp_ns);
+      result.looks.back() =
+          viewer.look(frame.grey, zoomed ? *zoomed : camera, estimate.camera_from_target.mean);
+    }
     estimate.residuals = {};  // most of an estimate, and nobody asks for them any more
     result.estimates.push_back(std::move(estimate));
-    result.frame_names.push_back(frame->name);
-    job.frame_done();
+    result.frame_names.push_back(frame.name);
+    job.done(1.0 / frames);
   };
   const auto threads = static_cast<size_t>(tbb::this_task_arena::max_concurrency());
   // A thread that waits takes frames of this flight only: one that began another flight meanwhile would keep
@@ -123,19 +138,20 @@ void estimate_frames(const BatchFlight& job, ImageSource& source, Estimator& est
   tbb::this_task_arena::isolate([&] {
     tbb::parallel_pipeline(
         kFramesAhead * threads,
-        tbb::make_filter<void, FramePtr>(tbb::filter_mode::serial_in_order,
-                                         [&](tbb::flow_control& flow) -> FramePtr {
-                                           auto frame = std::make_shared<Frame>();
-                                           if (!job.stop && source.advance(*frame)) return frame;
-                                           flow.stop();
-                                           return nullptr;
-                                         }) &
-            tbb::make_filter<FramePtr, FramePtr>(tbb::filter_mode::parallel,
-                                                 [&](FramePtr frame) {
-                                                   source.read(*frame);
-                                                   return frame;
-                                                 }) &
-            tbb::make_filter<FramePtr, void>(tbb::filter_mode::serial_in_order, estimate_frame));
+        tbb::make_filter<void, PicturePtr>(tbb::filter_mode::serial_in_order,
+                                           [&](tbb::flow_control& flow) -> PicturePtr {
+                                             auto picture = std::make_shared<Picture>();
+                                             if (!job.stop && source.advance(picture->frame)) return picture;
+                                             flow.stop();
+                                             return nullptr;
+                                           }) &
+            tbb::make_filter<PicturePtr, PicturePtr>(tbb::filter_mode::parallel,
+                                                     [&](PicturePtr picture) {
+                                                       source.read(picture->frame);
+                                                       picture->grey = grey_histogram(picture->frame.grey);
+                                                       return picture;
+                                                     }) &
+            tbb::make_filter<PicturePtr, void>(tbb::filter_mode::serial_in_order, estimate_frame));
   });
   if (job.stop) throw Interrupted();
   result.problems = aids.problems();
@@ -174,12 +190,14 @@ std::string run_flight(const BatchFlight& job) {
   result.chain = chain_of(job.config, result.flight);
   result.target = job.config.target.name;
   const CameraModel camera = camera_of(job.config, result.flight);
+  result.camera =
+      std::to_string(camera.width()) + 'x' + std::to_string(camera.height()) + ' ' + camera.lens();
   RunConfig config = job.config;
   config.frames = result.chain;
   Estimator estimator(config, camera);
   const auto source = open_image_source("flight:" + job.folder.string(), job.config.channel);
   FrameTables tables(job.output);
-  estimate_frames(job, *source, estimator, tables, result);
+  estimate_frames(job, *source, camera, estimator, tables, result);
   tables.close();
   result.problems.insert(result.problems.end(), source->problems().begin(), source->problems().end());
 

@@ -19,7 +19,7 @@ struct BatchFlight {
   std::filesystem::path folder;      // FLIGHT
   std::filesystem::path output;      // an empty folder that is not the result yet
   const std::atomic<bool>& stop;     // set: leave as soon as possible
-  std::function<void()> frame_done;  // called from any thread
+  std::function<void(double)> done;  // a further part of the flight is; called from any thread
 };
 
 // Thrown when `stop` was set; what was written then is not whole.

@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <system_error>
@@ -82,6 +83,17 @@ bool BatchFolder::is_finished(const std::string& flight, const BatchKey& key) co
     if (error || !size.is_number_unsigned() || found != size.get<uintmax_t>()) return false;
   }
   return true;
+}
+
+void BatchFolder::share(const std::string& name, std::string_view content) const {
+  std::ifstream there(of(name), std::ios::binary);
+  const std::string found{std::istreambuf_iterator<char>(there), {}};
+  if (found == content) return;
+  std::ofstream stream(own_ / name, std::ios::binary);
+  stream << content;
+  stream.close();
+  if (!stream) fail(own_ / name);
+  fs::rename(own_ / name, of(name));
 }
 
 fs::path BatchFolder::begin(const std::string& flight) const {

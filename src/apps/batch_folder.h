@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "batch_key.h"
 
@@ -29,6 +30,9 @@ class BatchFolder {
   // OUT/FLIGHTNAME.
   std::filesystem::path of(const std::string& flight) const { return folder_ / flight; }
   bool is_finished(const std::string& flight, const BatchKey& key) const;
+
+  // Puts a file into OUT that all its flights share, where it is not there yet as it should be.
+  void share(const std::string& name, std::string_view content) const;
 
   // An empty folder for a flight's files, of this process alone. From any thread, as is the next.
   std::filesystem::path begin(const std::string& flight) const;

@@ -36,11 +36,18 @@ Json read_summary(const fs::path& file) {
   return summary;
 }
 
+// A flight that the earlier run has not is as one that it could not estimate.
+Json summary_before(const fs::path& run, const std::string& flight) {
+  const fs::path file = run / flight / "summary.json";
+  std::error_code ignored;
+  return fs::exists(file, ignored) ? read_summary(file) : summary_json(failed_flight(flight, ""));
+}
+
 }  // namespace
 
 void write_season(const BatchFolder& folder, std::span<const SeasonFlight> flights,
-                  const std::string& resolved_configuration) {
-  Season season;
+                  const std::string& resolved_configuration, const fs::path& before) {
+  Season season, earlier;
   ResultsDatabase database(folder.path() / "results.sqlite");
   database.add_run("perch-batch " PERCH_VERSION, resolved_configuration);
   std::string csv = summary_csv_header();
@@ -52,6 +59,7 @@ void write_season(const BatchFolder& folder, std::span<const SeasonFlight> fligh
         flight.problem ? summary_json(failed()) : read_summary(folder.of(flight.name) / "summary.json");
     csv += summary_csv_row(summary);
     season.add(summary);
+    if (!before.empty()) earlier.add(summary_before(before, flight.name));
     database.add(summary);
     if (flights.size() > kMostInPage || bytes > kMostBytesInPage) continue;
     data.push_back(flight.problem ? flight_data({failed(), {}})
@@ -61,7 +69,9 @@ void write_season(const BatchFolder& folder, std::span<const SeasonFlight> fligh
   if (bytes > kMostBytesInPage && flights.size() > 1) data.clear();
   database.commit();
   write_whole_file(folder.path() / "summary.csv", csv);
-  write_whole_file(folder.path() / "report.html", season_html(season.json(), data, resolved_configuration));
+  write_whole_file(folder.path() / "report.html",
+                   season_html(season.json(), before.empty() ? Json(nullptr) : earlier.json(), data,
+                               resolved_configuration));
 }
 
 }  // namespace perch

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,8 +17,9 @@ struct SeasonFlight {
 };
 
 // Writes what a run says of all its flights, OUT/summary.csv, report.html and results.sqlite, from their
-// folders: whoever estimated them, and when, the bytes are the same.
+// folders: whoever estimated them, and when, the bytes are the same. The page shows them beside those of an
+// earlier run's folder where `before` names one.
 void write_season(const BatchFolder& folder, std::span<const SeasonFlight> flights,
-                  const std::string& resolved_configuration);
+                  const std::string& resolved_configuration, const std::filesystem::path& before);
 
 }  // namespace perch

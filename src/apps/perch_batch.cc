@@ -3,7 +3,6 @@
 #include <gflags/gflags.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -13,7 +12,6 @@
 #include <iostream>
 #include <iterator>
 #include <map>
-#include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <sstream>
 #include <thread>
@@ -22,7 +20,9 @@
 #include "batch_flight.h"
 #include "batch_folder.h"
 #include "batch_season.h"
+#include "perch/analysis/report.h"
 #include "program.h"
+#include "progress.h"
 
 DEFINE_string(config, "", "the run's configuration, a YAML file");
 DEFINE_string(output, "", "the folder that the results are written to");
@@ -116,25 +116,17 @@ std::vector<NamedFlight> of_shard(const std::vector<NamedFlight>& all, const Sha
   return mine;
 }
 
-// Counts frames: a line that grows on a terminal, nothing elsewhere.
-class Progress {
+// How many of the flights are done, parts of one counted.
+class FlightProgress {
  public:
-  void frame() {
-    const int64_t frames = ++frames_;
-    if (on_terminal_ && frames % 50 == 0) {
-      const std::lock_guard lock(mutex_);
-      std::cerr << '\r' << frames << " frames" << std::flush;
-    }
-  }
-  void flight(const std::string& text) {
-    const std::lock_guard lock(mutex_);
-    std::cerr << (on_terminal_ ? "\r" : "") << text << std::endl;
-  }
+  explicit FlightProgress(size_t flights) : flights_(static_cast<double>(flights)) {}
+  void add(double flight) { shown_.at((done_ += flight) / flights_, "flights"); }
+  void tell(const std::string& line) { shown_.tell(line); }
 
  private:
-  const bool on_terminal_ = isatty(STDERR_FILENO) != 0;
-  std::atomic<int64_t> frames_ = 0;
-  std::mutex mutex_;
+  const double flights_;
+  std::atomic<double> done_ = 0;
+  Progress shown_;
 };
 
 struct Outcome {
@@ -143,20 +135,23 @@ struct Outcome {
 };
 
 Outcome run_one(const BatchFolder& folder, const NamedFlight& flight, const RunConfig& config,
-                const std::string& resolved, BatchKey key, Progress& progress) {
+                const std::string& resolved, BatchKey key, FlightProgress& progress) {
   key.flight = flight_digest(flight.folder);
-  if (folder.is_finished(flight.name, key)) return {Outcome::kFinishedBefore, {}};
+  if (folder.is_finished(flight.name, key)) {
+    progress.add(1);
+    return {Outcome::kFinishedBefore, {}};
+  }
   try {
     std::string errors = run_flight({config, resolved, FLAGS_times, flight.folder, folder.begin(flight.name),
-                                     stop_requested, [&] { progress.frame(); }});
+                                     stop_requested, [&](double part) { progress.add(part); }});
     folder.finish(flight.name, key);
-    progress.flight(flight.folder.string() + ": done");
+    progress.tell(flight.folder.string() + ": done");
     return {Outcome::kDone, std::move(errors)};
   } catch (const Interrupted&) {
     return {};
   } catch (const std::exception& e) {
     folder.forget(flight.name);
-    progress.flight(std::string("perch-batch: ") + e.what());
+    progress.tell(std::string("perch-batch: ") + e.what());
     return {Outcome::kFailed, e.what()};
   }
 }
@@ -168,7 +163,7 @@ std::vector<Outcome> run_all(const BatchFolder& folder, const std::vector<NamedF
                              size_t threads) {
   std::vector<Outcome> outcomes(flights.size());
   std::atomic<size_t> next = 0;
-  Progress progress;
+  FlightProgress progress(flights.size());
   tbb::parallel_for(
       size_t{0}, std::min(threads, flights.size()),
       [&](size_t) {
@@ -254,7 +249,7 @@ int report(const BatchFolder& folder, const std::vector<NamedFlight>& flights,
   if (counts[Outcome::kFinishedBefore] > 0)
     std::cout << counts[Outcome::kFinishedBefore] << " of " << flights.size() << " flights finished before\n";
   if (shard.n == 1) {
-    write_season(folder, season, resolved);
+    write_season(folder, season, resolved, FLAGS_compare);
     std::cout << "report: " << (folder.path() / "report.html").string() << '\n';
   }
   const bool worse = !FLAGS_compare.empty() && compare(FLAGS_compare, folder.path(), compared);
@@ -289,6 +284,7 @@ int run(const CommandLine& line) {
   const BatchKey key = key_of(config, root);
   const std::string resolved = root.resolved();
   const BatchFolder folder(FLAGS_output);
+  folder.share(kReportScript, report_script());
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
 

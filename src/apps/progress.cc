@@ -15,6 +15,15 @@ void Progress::end_line() {
   told_ = -1;
 }
 
+void Progress::tell(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  if (terminal_ && told_ >= 0) {
+    std::cerr << "\r\033[K";
+    told_ = -1;  // the bar is drawn anew
+  }
+  std::cerr << line << std::endl;
+}
+
 void Progress::at(double part, const std::string& what) {
   const std::lock_guard lock(mutex_);
   if (what != what_) {

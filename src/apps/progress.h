@@ -13,6 +13,8 @@ class Progress {
   ~Progress();
   // `part` of `what` is done, 0 to 1. From any thread.
   void at(double part, const std::string& what);
+  // A line of its own, above the bar. From any thread.
+  void tell(const std::string& line);
 
  private:
   void end_line();

@@ -40,7 +40,7 @@ std::string page_with_picture(const FlightResult& result, const std::string& byt
   ReportPicture& picture = flights[0].pictures.emplace_back();
   picture.shown.frame = 0;
   picture.jpeg.assign(bytes.begin(), bytes.end());
-  return report_html(flights, configuration);
+  return flight_html(flights[0], configuration);
 }
 
 TEST(Report, HoldsItsFlightsAsJson) {
@@ -48,7 +48,8 @@ TEST(Report, HoldsItsFlightsAsJson) {
   FlightResult result = make_flight({.frames = 30, .noise = 0.01}, rng);
   lose(result, 3, EstimateStatus::kPartial);
   const std::vector<ReportFlight> flights = {report_flight(result), report_flight({})};
-  const auto data = embedded(report_html(flights, "target: a.yaml\n"));
+  const std::vector<std::string> texts = {flight_data(flights[0]), flight_data(flights[1])};
+  const auto data = embedded(season_html(nullptr, nullptr, texts, "target: a.yaml\n"));
   ASSERT_EQ(data.size(), 2u);
   const auto& frames = data[0]["frames"];
   EXPECT_EQ(frames["status"], "000200000000000000000000000000");
@@ -72,7 +73,7 @@ TEST(Report, AFlightsDataComesOutOfItsPageAsItWentIn) {
   FlightResult result = make_flight({.frames = 3}, rng);
   result.flight.name = "</script>\n<b>";
   const std::vector<ReportFlight> flights = {report_flight(result)};
-  EXPECT_EQ(flight_data_of_page(report_html(flights, "</script>")), flight_data(flights[0]));
+  EXPECT_EQ(flight_data_of_page(flight_html(flights[0], "</script>")), flight_data(flights[0]));
   EXPECT_EQ(flight_data_of_page(""), "");
   EXPECT_EQ(flight_data_of_page("<script class=\"flight\" type=\"application/json\">{"), "");
 }
@@ -82,14 +83,17 @@ TEST(Report, ASeasonOfThousandsIsSmall) {
   const auto summary = summary_json(score_flight(make_flight({.frames = 30, .noise = 0.01}, rng)));
   Season season;
   for (int i = 0; i < 5000; ++i) season.add(summary);
-  // Each flight some 20 columns of 8 characters.
-  EXPECT_LE(season_html(season.json(), {}, "").size(), 700'000u + 5000 * 20 * 8);
+  // Each flight some 20 columns of 8 characters, twice.
+  EXPECT_LE(season_html(season.json(), season.json(), {}, "").size(), 700'000u + 2 * 5000 * 25 * 8);
 }
 
 TEST(Report, AsksTheNetworkForNothing) {
   TestRng rng;
-  const std::vector<ReportFlight> flights = {report_flight(make_flight({}, rng))};
-  const std::string html = report_html(flights, "");
+  const ReportFlight flight = report_flight(make_flight({}, rng));
+  const std::string data = flight_data(flight);
+  const std::string season = season_html(nullptr, nullptr, {&data, 1}, "");
+  const std::string page = flight_html(flight, "");
+  const std::string html = season + page + std::string(report_script());
   // Where a page loads from; an address in a comment or a string loads nothing.
   const std::regex loads(
       R"((src|href|action)\s*=\s*["']?\s*(https?:)?//|url\(\s*["']?\s*(https?:)?//|@import)"
@@ -98,8 +102,12 @@ TEST(Report, AsksTheNetworkForNothing) {
   EXPECT_FALSE(std::regex_search(html, found, loads)) << found.str();
   // And the browser is told to refuse what slipped through.
   EXPECT_THAT(
-      html, HasSubstr("content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
-                      "img-src data:\""));
+      season,
+      HasSubstr("content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+                "img-src data:\""));
+  EXPECT_THAT(page,
+              HasSubstr("content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'self' file:; "
+                        "img-src data:\""));
 }
 
 TEST(Report, NoTextBreaksOutOfItsPlace) {
@@ -139,8 +147,7 @@ TEST(Report, TimeAscendsWhereTheClockWentBack) {
   FlightResult result = make_flight({.frames = 5}, rng);
   result.estimates[3].timestamp_ns = kStartNs - 1'000'000'000;
   lose(result, 3, EstimateStatus::kRejected);
-  const std::vector<ReportFlight> flights = {report_flight(result)};
-  const auto frames = embedded(report_html(flights, ""))[0]["frames"];
+  const auto frames = embedded(flight_html(report_flight(result), ""))[0]["frames"];
   const auto times = frames["time_s"].get<std::vector<double>>();
   EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
   EXPECT_EQ(frames["status"], "40000");
@@ -148,11 +155,36 @@ TEST(Report, TimeAscendsWhereTheClockWentBack) {
 
 TEST(Report, StaysSmallForALongFlight) {
   TestRng rng;
-  const std::vector<ReportFlight> flights = {
-      report_flight(make_flight({.frames = 3000, .noise = 0.01}, rng))};
-  // 30 numbers of some 7 characters a frame.
-  // The page itself, most of it three.js.
-  EXPECT_LE(report_html(flights, "").size(), 700'000u + 3000 * 30 * 8);
+  const ReportFlight flight = report_flight(make_flight({.frames = 3000, .noise = 0.01}, rng));
+  // 37 numbers of some 7 characters a frame, and the page's style.
+  EXPECT_LE(flight_html(flight, "").size(), 15'000u + 3000 * 37 * 8);
+}
+
+TEST(Report, OfAVeryLongFlightTheWorstFramesAreShown) {
+  TestRng rng;
+  FlightResult result = make_flight({.frames = 13'000, .noise = 0.01}, rng);
+  lose(result, 7777, EstimateStatus::kPartial);
+  result.estimates[5000].pad_from_body->mean.translation.x() += 1;
+  const auto frames = embedded(flight_html(report_flight(result), ""))[0]["frames"];
+  EXPECT_EQ(frames["each"], 2);
+  EXPECT_EQ(frames["time_s"].size(), 6500u);
+  EXPECT_EQ(frames["status"].get<std::string>()[7777 / 2], '2');
+  EXPECT_GT(frames["position_error_cm"][5000 / 2].get<double>(), 90);
+}
+
+TEST(Report, ShowsGreyLevelsAsLettersOfTheirShares) {
+  TestRng rng;
+  FlightResult result = make_flight({.frames = 1000}, rng);
+  result.greys.resize(1000);
+  for (GreyHistogram& grey : result.greys) grey.share[3] = 65535;
+  result.greys[7] = {};  // could not be read
+  const auto grey = embedded(flight_html(report_flight(result), ""))[0]["frames"]["grey"];
+  // 999 pictures in at most 240 columns: five each, the last of four.
+  ASSERT_EQ(grey["from_s"].size(), 200u);
+  const std::string levels = grey["levels"];
+  ASSERT_EQ(levels.size(), 200 * GreyHistogram::kBins);
+  EXPECT_EQ(levels.substr(0, 6), "000z00");
+  EXPECT_TRUE(embedded(flight_html(report_flight(make_flight({}, rng)), ""))[0]["frames"]["grey"].is_null());
 }
 
 }  // namespace

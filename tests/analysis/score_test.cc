@@ -65,12 +65,12 @@ TEST(Score, NavigationIsAskedAtItsOwnTime) {
 TEST(Score, NeesOfHonestNoiseIsWithinItsBounds) {
   TestRng rng;
   const FlightScore score = score_flight(make_flight({.frames = 2000, .noise = 0.05}, rng));
-  EXPECT_EQ(score.consistency.count, 2000u);
+  EXPECT_EQ(score.consistency.nees.count, 2000u);
   // The bounds of 95 %, doubled in width: four sigma of the mean.
-  const double half = score.consistency.upper - 6;
+  const double half = score.consistency.nees.upper - 6;
   EXPECT_NEAR(half, 2 * std::sqrt(12.0 / 2000), 0.01);  // chi-square's variance 2 k, k = 6
-  EXPECT_NEAR(score.consistency.mean_nees, 6, 2 * half);
-  EXPECT_NEAR(score.consistency.fraction_inside, 0.95, 4 * std::sqrt(0.95 * 0.05 / 2000));
+  EXPECT_NEAR(score.consistency.nees.mean, 6, 2 * half);
+  EXPECT_NEAR(score.consistency.nees.fraction_inside, 0.95, 4 * std::sqrt(0.95 * 0.05 / 2000));
 }
 
 TEST(Score, NeesOfABoastIsAbove) {
@@ -78,7 +78,7 @@ TEST(Score, NeesOfABoastIsAbove) {
   FlightResult result = make_flight({.frames = 200, .noise = 0.05}, rng);
   for (Estimate& estimate : result.estimates) estimate.camera_from_target.covariance /= 4;
   const FlightScore score = score_flight(result);
-  EXPECT_GT(score.consistency.mean_nees, 3 * score.consistency.upper);
+  EXPECT_GT(score.consistency.nees.mean, 3 * score.consistency.nees.upper);
 }
 
 TEST(Score, NavigationsNoiseIsNotVisionsWhereThereIsTruth) {
@@ -94,14 +94,14 @@ TEST(Score, NavigationsNoiseIsNotVisionsWhereThereIsTruth) {
   // them.
   EXPECT_NEAR(score.truth->position.rms, 0.01 * std::sqrt(3), 0.073 * 0.01 * std::sqrt(3));
   EXPECT_GT(score.position.rms, 0.08);
-  EXPECT_NEAR(score.consistency.mean_nees, 6, 2 * (score.consistency.upper - 6));
+  EXPECT_NEAR(score.consistency.nees.mean, 6, 2 * (score.consistency.nees.upper - 6));
 
   // Without it navigation's noise is in the number, and the score says so.
   result.flight.truth.samples.clear();
   const FlightScore by_navigation = score_flight(result);
   EXPECT_FALSE(by_navigation.truth);
   EXPECT_FALSE(by_navigation.consistency.by_truth);
-  EXPECT_GT(by_navigation.consistency.mean_nees, 10 * 6);
+  EXPECT_GT(by_navigation.consistency.nees.mean, 10 * 6);
 }
 
 TEST(Score, TruthIsOnTheCamerasClock) {
@@ -136,7 +136,7 @@ TEST(Score, NeesOfHonestTiltFarAwayIsWithinItsBounds) {
   }
   const FlightScore score = score_flight(result);
   // The bounds of 95 %, doubled in width: four sigma of the mean.
-  EXPECT_NEAR(score.consistency.mean_nees, 6, 2 * (score.consistency.upper - 6));
+  EXPECT_NEAR(score.consistency.nees.mean, 6, 2 * (score.consistency.nees.upper - 6));
   // sqrt(1 + 1 + 4) cm at 1 to 9 m; the body's own is a tilt of 0.14 rad, some 14 % of the range.
   EXPECT_GT(score.consistency.seen_over_range_rms, 0.0245 / 9);
   EXPECT_LT(score.consistency.seen_over_range_rms, 0.0245 / 1);
@@ -167,18 +167,18 @@ TEST(Score, SigmasOfTheAnglesAreThoseOfSamples) {
 TEST(Score, CovarianceThatIsNoneGivesNoNees) {
   TestRng rng;
   const FlightScore score = score_flight(make_flight({.frames = 10, .noise = 0}, rng));  // all zero
-  EXPECT_EQ(score.consistency.count, 0u);
+  EXPECT_EQ(score.consistency.nees.count, 0u);
   EXPECT_EQ(score.position.count, 10u);
 }
 
 TEST(Score, BinsHoldEveryComparedFrameOnce) {
   TestRng rng;
   const FlightScore score = score_flight(make_flight({.frames = 300, .noise = 0.02}, rng));
-  ASSERT_FALSE(score.bins.empty());
-  EXPECT_LE(score.bins.size(), 10u);
-  EXPECT_GE(score.bins.size(), 5u);
+  ASSERT_FALSE(score.curves[0].bins.empty());
+  EXPECT_LE(score.curves[0].bins.size(), 10u);
+  EXPECT_GE(score.curves[0].bins.size(), 5u);
   size_t frames = 0;
-  for (const DistanceBin& bin : score.bins) {
+  for (const ErrorBin& bin : score.curves[0].bins) {
     frames += bin.count;
     size_t expected = 0;
     for (const FrameRecord& frame : score.frames) expected += bin.from <= frame.range && frame.range < bin.to;
@@ -191,7 +191,7 @@ TEST(Score, HoveringFillsOneBin) {
   TestRng rng;
   FlightResult result = make_flight({.frames = 20}, rng);
   for (Estimate& estimate : result.estimates) estimate.camera_from_target.mean.translation = {0, 0, 2.005};
-  EXPECT_THAT(score_flight(result).bins, ElementsAre(Field(&DistanceBin::count, 20u)));
+  EXPECT_THAT(score_flight(result).curves[0].bins, ElementsAre(Field(&ErrorBin::count, 20u)));
 }
 
 TEST(Score, RelativeErrorIsOverTheRange) {
@@ -258,7 +258,7 @@ TEST(Score, SaysWhyNothingIsCompared) {
   EXPECT_EQ(score_flight(no_pad).comparison, Comparison::kNoWorldFromPad);
   EXPECT_EQ(score_flight(no_nav).comparison, Comparison::kNoNavigation);
   EXPECT_EQ(score_flight(undetected).comparison, Comparison::kNoCommonTime);
-  EXPECT_THAT(score_flight(no_nav).bins, IsEmpty());
+  EXPECT_THAT(score_flight(no_nav).curves[0].bins, IsEmpty());
   EXPECT_TRUE(score_flight(no_nav).frames[0].vision);
   EXPECT_EQ(score_flight(no_nav).reprojection_px.count, 5u);
 }

@@ -95,5 +95,41 @@ TEST(Statistics, ChiSquareQuantilesOfManyDegreesAreNormal) {
   EXPECT_NEAR(chi_square_quantile(0.025, k) / k, std::pow(1 - c - z * std::sqrt(c), 3), 1e-7);
 }
 
+// How often of `runs` the interval of errors whose RMS is 1 holds it.
+double coverage(int seconds, int each, bool alike, TestRng& rng) {
+  constexpr int kRuns = 2000;
+  int held = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    std::vector<double> values;
+    std::vector<int64_t> clusters;
+    for (int second = 0; second < seconds; ++second) {
+      const double common = rng.normal(1);
+      for (int i = 0; i < each; ++i) {
+        values.push_back(alike ? common : rng.normal(1));
+        clusters.push_back(second);
+      }
+    }
+    const RmsInterval interval = rms_interval(values, clusters);
+    held += interval.low <= 1 && 1 <= interval.high;
+  }
+  return static_cast<double>(held) / kRuns;
+}
+
+TEST(RmsInterval, HoldsTheRms95TimesOf100) {
+  TestRng rng;
+  // 2000 runs scatter by 0.5 %; four of that. The mean of few squares is skewed, which costs some percent.
+  EXPECT_NEAR(coverage(30, 10, false, rng), 0.95, 0.02);
+  EXPECT_NEAR(coverage(5, 30, false, rng), 0.95, 0.02);
+  EXPECT_NEAR(coverage(100, 10, true, rng), 0.94, 0.03);
+  EXPECT_GT(coverage(10, 10, true, rng), 0.84);
+}
+
+TEST(RmsInterval, SaysNothingOfFewerThanThreeSeconds) {
+  const std::vector<double> values = {1, 2, 3};
+  EXPECT_TRUE(std::isnan(rms_interval(values, std::vector<int64_t>{1, 1, 2}).low));
+  EXPECT_TRUE(std::isnan(rms_interval({}, {}).high));
+  EXPECT_FALSE(std::isnan(rms_interval(values, std::vector<int64_t>{1, 2, 3}).high));
+}
+
 }  // namespace
 }  // namespace perch

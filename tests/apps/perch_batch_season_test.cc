@@ -10,6 +10,7 @@
 #include <chrono>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -35,11 +36,17 @@ class PerchBatchSeason : public testing::Test {
  protected:
   // Flights f0 to f5: one simulated, and copies whose pictures come in another order. The last two are
   // broken.
-  PerchBatchSeason() {
-    folder_.write("landing.yaml",
+  static void SetUpTestSuite() {
+    flown_ = std::make_unique<TempFolder>();
+    flown_->write("landing.yaml",
                   "target: " + std::string(PERCH_SOURCE_DIR) + "/configs/targets/sharp.yaml\n" + kSimulation);
-    const Outcome made = run_program_in(folder_, PERCH_SIMULATE, "--config landing.yaml --output f0");
+    const Outcome made = run_program_in(*flown_, PERCH_SIMULATE, "--config landing.yaml --output f0");
     EXPECT_EQ(made.code, 0) << made.err;
+  }
+  static void TearDownTestSuite() { flown_.reset(); }
+
+  PerchBatchSeason() {
+    fs::copy(*flown_ / "f0", folder_ / "f0", fs::copy_options::recursive);
     std::string manifest = "# the season\n";
     for (int i = 0; i < kFlights; ++i) {
       const std::string name = "f" + std::to_string(i);
@@ -79,6 +86,7 @@ class PerchBatchSeason : public testing::Test {
     for (const auto& [name, content] : a) EXPECT_TRUE(b.contains(name) && b.at(name) == content) << name;
     for (const auto& [name, content] : b) EXPECT_TRUE(a.contains(name)) << name;
   }
+  static inline std::unique_ptr<TempFolder> flown_;
   TempFolder folder_;
 };
 

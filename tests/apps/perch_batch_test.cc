@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -31,12 +32,16 @@ constexpr size_t kFrames = 12;
 
 class PerchBatch : public testing::Test {
  protected:
-  PerchBatch() {
-    folder_.write("landing.yaml",
+  static void SetUpTestSuite() {
+    flown_ = std::make_unique<TempFolder>();
+    flown_->write("landing.yaml",
                   "target: " + std::string(PERCH_SOURCE_DIR) + "/configs/targets/sharp.yaml\n" + kSimulation);
-    const Outcome made = run_program_in(folder_, PERCH_SIMULATE, "--config landing.yaml --output good");
+    const Outcome made = run_program_in(*flown_, PERCH_SIMULATE, "--config landing.yaml --output good");
     EXPECT_EQ(made.code, 0) << made.err;
   }
+  static void TearDownTestSuite() { flown_.reset(); }
+
+  PerchBatch() { fs::copy(*flown_ / "good", folder_ / "good", fs::copy_options::recursive); }
   Outcome run(const std::string& arguments) const { return run_program_in(folder_, PERCH_BATCH, arguments); }
   Outcome run_flights(const std::string& flights) const {
     return run("--config good/perch.yaml --output out " + flights);
@@ -55,6 +60,7 @@ class PerchBatch : public testing::Test {
   json summary(const std::string& flight) const {
     return json::parse(read_file(folder_ / "out" / flight / "summary.json"));
   }
+  static inline std::unique_ptr<TempFolder> flown_;
   TempFolder folder_;
 };
 
@@ -64,9 +70,9 @@ TEST_F(PerchBatch, ScoresAFlightAndWritesAllItsFiles) {
   EXPECT_THAT(result.out,
               HasSubstr("good: 12 of 12 frames with a pose (100.0 %), 12 compared with navigation"));
   EXPECT_THAT(result.out, HasSubstr("report: out/report.html\n"));
-  for (const char* file :
-       {"good/estimates.csv", "good/states.csv", "good/pad_from_body.tum", "good/errors.csv",
-        "good/summary.json", "good/report.html", "summary.csv", "report.html", "results.sqlite"}) {
+  for (const char* file : {"good/estimates.csv", "good/states.csv", "good/pad_from_body.tum",
+                           "good/errors.csv", "good/summary.json", "good/report.html", "summary.csv",
+                           "report.html", "report.js", "results.sqlite"}) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / file)) << file;
   }
   // The simulator's truth: a hundredth of the distance is what 320 x 240 gives at the very worst.
@@ -141,9 +147,9 @@ TEST_F(PerchBatch, ComparesWithAnEarlierRun) {
   const Outcome result = run("--config good/perch.yaml --output out --compare before good");
   EXPECT_EQ(result.code, 0) << result.err;
   const std::string changes = result.out.substr(result.out.find("A: before, B: out, 1 flights, 12 frames"));
-  for (const char* line : {"  B finds ", "  position RMS ", "  attitude RMS ",
-                           "  time a frame ", "  good:\n", "    with a pose ", "    yaw RMS ",
-                           "    position RMS, truth ", "    mean NEES ", "    median time a frame "}) {
+  for (const char* line : {"  B finds ", "  position RMS ", "  attitude RMS ", "  time a frame ", "  good:\n",
+                           "    with a pose ", "    yaw RMS ", "    position RMS, truth ", "    mean NEES ",
+                           "    median time a frame "}) {
     EXPECT_THAT(changes, HasSubstr(line));
   }
   EXPECT_THAT(changes, Not(HasSubstr("nan")));
@@ -191,10 +197,10 @@ TEST_F(PerchBatch, AnInterruptLeavesWholeFilesOnly) {
   size_t done = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "out")) {
     if (entry.is_directory()) continue;
-    EXPECT_THAT(
-        entry.path().filename().string(),
-        testing::AnyOf("estimates.csv", "states.csv", "pad_from_body.tum", "errors.csv", "summary.json",
-                       "complete.json", "summary.csv", "report.html", "results.sqlite", ".lock"));
+    EXPECT_THAT(entry.path().filename().string(),
+                testing::AnyOf("estimates.csv", "states.csv", "pad_from_body.tum", "errors.csv",
+                               "summary.json", "complete.json", "summary.csv", "report.html", "report.js",
+                               "results.sqlite", ".lock"));
     if (entry.path().filename() != "estimates.csv") continue;
     ++done;
     const std::string text = read_file(entry.path());

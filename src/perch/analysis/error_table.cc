@@ -31,12 +31,12 @@ std::string size_row(const std::string& name, const Statistics& s, double shown_
 
 // Against navigation there is no verdict: its noise, mostly larger than vision's, is in the number.
 std::string consistency_row(const Consistency& c) {
-  if (c.count == 0) return "";
+  if (c.nees.count == 0) return "";
   if (!c.by_truth)
-    return format("  mean NEES %.2f, with navigation's noise counted as vision's\n", c.mean_nees);
+    return format("  mean NEES %.2f, with navigation's noise counted as vision's\n", c.nees.mean);
   return format(
       "  the target in the camera's frame %.3f %% of the range; mean NEES %.2f, honest within %.2f to %.2f\n",
-      100 * c.seen_over_range_rms, c.mean_nees, c.lower, c.upper);
+      100 * c.seen_over_range_rms, c.nees.mean, c.nees.lower, c.nees.upper);
 }
 
 }  // namespace

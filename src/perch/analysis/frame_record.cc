@@ -1,5 +1,6 @@
 #include "perch/analysis/frame_record.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "perch/geometry/euler.h"
@@ -57,10 +58,13 @@ FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain,
   record.status = estimate.status;
   record.total_us = estimate.total_us;
   record.ambiguity = estimate.ambiguity;
+  record.threshold = estimate.threshold;
+  if (estimate.state) record.nis = estimate.state->innovation_squared;
 
   std::optional<Rigid3> navigation;
   if (const auto sample = flight.nav.at(navigation_time_ns(chain, estimate.timestamp_ns))) {
     navigation = pad_from_body_by_navigation(chain, sample->world_from_body);
+    record.speed = sample->body_velocity_in_world.norm();
   }
   if (navigation) record.navigation = six_states(*navigation);
 
@@ -68,7 +72,10 @@ FrameRecord make_frame_record(const Estimate& estimate, const FrameChain& chain,
   const UncertainRigid3& vision = *estimate.pad_from_body;
   const SixStates states = six_states(vision.mean);
   if (!states.allFinite()) return record;  // one NaN would make every statistic NaN
-  record.range = estimate.camera_from_target.mean.translation.norm();
+  const Eigen::Vector3d camera_in_target = inverse(estimate.camera_from_target.mean).translation;
+  record.range = camera_in_target.norm();
+  if (record.range > 0)
+    record.view_angle = std::acos(std::clamp(camera_in_target.z() / record.range, -1.0, 1.0));
   record.reprojection_rms_px = estimate.reprojection_rms_px;
   record.features = estimate.features;
   record.vision = states;

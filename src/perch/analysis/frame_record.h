@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "perch/analysis/frame_look.h"
 #include "perch/estimator/estimate.h"
 #include "perch/flight/flight.h"
 #include "perch/frames/frame_chain.h"
@@ -38,14 +39,20 @@ struct FrameError {
   std::optional<double> nees;
 };
 
-// What the analysis keeps of an estimate: some 350 bytes, so that a long flight's correspondences can go.
+// What the analysis keeps of an estimate: some 500 bytes, so that a long flight's correspondences can go.
 struct FrameRecord {
   int64_t timestamp_ns = 0;  // camera clock
   EstimateStatus status = EstimateStatus::kNoTarget;
   double total_us = 0;
   double ambiguity = 0;
+  int threshold = -1;                                       // grey level, where the method had one
+  GreyHistogram grey;                                       // of the picture
+  std::optional<double> nis;                                // the filter's normalised innovation squared
+  double speed = std::numeric_limits<double>::quiet_NaN();  // of the body by navigation, m/s
   // With kOk:
-  double range = std::numeric_limits<double>::quiet_NaN();  // camera to the target's origin, m
+  double range = std::numeric_limits<double>::quiet_NaN();       // camera to the target's origin, m
+  double view_angle = std::numeric_limits<double>::quiet_NaN();  // line of sight to the target's normal, rad
+  std::optional<TargetLook> look;
   double reprojection_rms_px = std::numeric_limits<double>::quiet_NaN();
   int features = 0;
   std::optional<SixStates> vision, sigma;

@@ -29,7 +29,7 @@ void write_flight_files(const std::filesystem::path& folder, const ReportFlight&
                         const std::string& configuration) {
   write(folder / "errors.csv", errors_csv(flight.score));
   write(folder / "summary.json", to_text(summary_json(flight.score), 2) + "\n");
-  write(folder / "report.html", report_html({&flight, 1}, configuration));
+  write(folder / "report.html", flight_html(flight, configuration));
 }
 
 }  // namespace perch

@@ -5,7 +5,10 @@
 namespace perch {
 
 std::string page_head(const std::string& title, PageScripts scripts) {
-  const std::string allowed = scripts == PageScripts::kInline ? "script-src 'unsafe-inline'; " : "";
+  // A file has no origin that 'self' could mean in every browser.
+  const std::string allowed = scripts == PageScripts::kInline   ? "script-src 'unsafe-inline'; "
+                              : scripts == PageScripts::kBeside ? "script-src 'self' file:; "
+                                                                : "";
   return R"(<!DOCTYPE html>
 <html lang="en">
 <head>

@@ -5,9 +5,13 @@
 
 namespace perch {
 
-// What the pages of a run and of a calibration have in common: each one file that opens offline.
+// What the pages of a run and of a calibration have in common: they open offline.
 
-enum class PageScripts { kNone, kInline };
+enum class PageScripts {
+  kNone,
+  kInline,
+  kBeside,  // in a file of its own, which the page loads from where it was itself loaded
+};
 
 // From the first line to the page's icon, within <head>. `title` is text of ours. The browser itself is told
 // that the page may load nothing, and run nothing where it has no scripts.

@@ -25,6 +25,13 @@ const std::vector<SummaryColumn>& more_columns() {
       {"target", "", At("/target")},
       {"start", "[ns]", At("/start_ns")},
       {"duration", "[s]", At("/duration_s")},
+      {"camera", "", At("/conditions/camera")},
+      {"rate", "[Hz]", At("/conditions/rate_hz")},
+      {"median_range", "[m]", At("/conditions/median_range_m")},
+      {"median_view_angle", "[rad]", At("/conditions/median_view_angle_rad")},
+      {"median_speed", "[m_s]", At("/conditions/median_speed_m_s")},
+      {"median_white", "", At("/conditions/median_white")},
+      {"median_visible", "", At("/conditions/median_visible")},
       {"truth_position_rms", "[m]", At("/truth/position_m/rms")},
       {"truth_rotation_rms", "[rad]", At("/truth/rotation_rad/rms")},
       {"truth_position_over_range_rms", "[]", At("/truth/position_over_range_rms")}};
@@ -80,8 +87,11 @@ ResultsDatabase::ResultsDatabase(std::filesystem::path file)
   execute(flights_table());
   execute("CREATE TABLE gaps(flight TEXT, first_frame, frames, start_s, duration_s, reasons TEXT)");
   execute(
-      "CREATE TABLE distance_bins(flight TEXT, from_m, to_m, frames, position_rms_m, position_median_m, "
-      "rotation_rms_rad)");
+      "CREATE TABLE error_bins(flight TEXT, quantity TEXT, unit TEXT, low, high, frames, position_rms_m, "
+      "position_rms_low_m, position_rms_high_m, position_median_m, rotation_rms_rad)");
+  execute(
+      "CREATE TABLE touch_down(flight TEXT, from_s, to_s, frames, place_rms_m, place_median_m, time_rms_s, "
+      "time_mean_s)");
   execute("CREATE TABLE stages(flight TEXT, stage TEXT, frames, mean_us, median_us, p99_us, share)");
   execute("CREATE TABLE problems(flight TEXT, problem TEXT)");
 }
@@ -104,17 +114,25 @@ void ResultsDatabase::add(const Json& summary) {
   }
   insert("flights", row);
   const Json flight = item(summary, "flight");
-  const auto add_list = [&](const char* table, const Json& list, std::initializer_list<const char*> keys) {
+  const auto add_list = [&](const char* table, const Json& list, std::initializer_list<const char*> keys,
+                            const Row& first = {}) {
     for (const Json& entry : list) {
       Row values = {flight};
+      values.insert(values.end(), first.begin(), first.end());
       for (const char* key : keys) values.push_back(item(entry, key));
       insert(table, values);
     }
   };
   add_list("gaps", item(item(summary, "detection"), "gaps"),
            {"first_frame", "frames", "start_s", "duration_s", "reasons"});
-  add_list("distance_bins", item(summary, "distance_bins"),
-           {"from_m", "to_m", "frames", "position_rms_m", "position_median_m", "rotation_rms_rad"});
+  for (const Json& curve : item(summary, "error_curves")) {
+    add_list("error_bins", item(curve, "bins"),
+             {"from", "to", "frames", "position_rms_m", "position_rms_low_m", "position_rms_high_m",
+              "position_median_m", "rotation_rms_rad"},
+             {item(curve, "by"), item(curve, "unit")});
+  }
+  add_list("touch_down", item(item(summary, "touch_down"), "forecasts"),
+           {"from_s", "to_s", "frames", "place_rms_m", "place_median_m", "time_rms_s", "time_mean_s"});
   add_list("stages", item(summary, "stages"), {"stage", "frames", "mean_us", "median_us", "p99_us", "share"});
   for (const Json& problem : item(summary, "problems")) insert("problems", {flight, problem});
 }

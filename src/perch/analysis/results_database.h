@@ -10,8 +10,9 @@ struct sqlite3;
 namespace perch {
 
 // A season's results as an SQLite file, for those who ask with SQL, pandas, R or DuckDB (docs/BATCH.md):
-// tables `flights` (what summary.csv has, and more), `gaps`, `distance_bins`, `stages`, `problems` and `run`.
-// Like an AtomicFile, it is whole or not there. The same flights in the same order give the same bytes.
+// tables `flights` (what summary.csv has, and more), `gaps`, `error_bins`, `touch_down`, `stages`, `problems`
+// and `run`. Like an AtomicFile, it is whole or not there. The same flights in the same order give the same
+// bytes.
 class ResultsDatabase {
  public:
   // Throws std::runtime_error naming what cannot be written, as do the others.

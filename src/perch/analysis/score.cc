@@ -6,76 +6,40 @@
 namespace perch {
 namespace {
 
-// At most this many bins: more would leave too few frames in each for an RMS.
-constexpr double kMostBins = 10;
-
-// The shortest of 1, 2, 5, 10, ... (and their tenths) that covers `span` in at most kMostBins steps: edges at
-// which a person would put them.
-double bin_width(double span) {
-  // A hovering flight's range hardly varies: one bin of a centimetre then.
-  const double least = std::max(span / (kMostBins - 1), 0.01);
-  const double decade = std::pow(10, std::floor(std::log10(least)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    // The tolerance forgives the rounding of pow and log10.
-    if (factor * decade >= least * (1 - 1e-9)) return factor * decade;
+NormalisedErrors check_normalised(std::span<const double> values) {
+  NormalisedErrors checked;
+  checked.count = values.size();
+  if (values.empty()) return checked;
+  double sum = 0;
+  size_t inside = 0;
+  for (const double value : values) {
+    sum += value;
+    if (kChiSquareLower <= value && value <= kChiSquareUpper) ++inside;
   }
-  return 10 * decade;
-}
-
-std::vector<DistanceBin> bin_by_distance(const std::vector<const FrameRecord*>& compared) {
-  if (compared.empty()) return {};
-  const auto [nearest, farthest] = std::minmax_element(
-      compared.begin(), compared.end(), [](const auto* a, const auto* b) { return a->range < b->range; });
-  const double width = bin_width((*farthest)->range - (*nearest)->range);
-  const double first = std::floor((*nearest)->range / width);
-  const auto index = [&](double range) { return static_cast<size_t>(std::floor(range / width) - first); };
-
-  struct Errors {
-    std::vector<double> position, rotation;
-  };
-  std::vector<Errors> errors(index((*farthest)->range) + 1);
-  for (const FrameRecord* frame : compared) {
-    errors[index(frame->range)].position.push_back(frame->error->position);
-    errors[index(frame->range)].rotation.push_back(frame->error->rotation);
-  }
-  std::vector<DistanceBin> bins;
-  for (size_t i = 0; i < errors.size(); ++i) {
-    const Statistics position = statistics(errors[i].position);
-    const double from = (first + static_cast<double>(i)) * width;
-    bins.push_back({.from = from,
-                    .to = from + width,
-                    .count = position.count,
-                    .position_rms = position.rms,
-                    .position_median = position.median,
-                    .rotation_rms = statistics(errors[i].rotation).rms});
-  }
-  return bins;
+  const auto n = static_cast<double>(values.size());
+  const int degrees_of_freedom = 6 * static_cast<int>(values.size());
+  checked.mean = sum / n;
+  checked.lower = chi_square_quantile(0.025, degrees_of_freedom) / n;
+  checked.upper = chi_square_quantile(0.975, degrees_of_freedom) / n;
+  checked.fraction_inside = static_cast<double>(inside) / n;
+  return checked;
 }
 
 // Against the truth where `has_truth`, else against navigation, which may be the truth itself.
 Consistency check_consistency(std::span<const FrameRecord> frames, bool has_truth, bool nav_is_truth) {
   Consistency consistency;
   consistency.by_truth = has_truth || nav_is_truth;
-  double sum = 0;
-  size_t inside = 0;
-  std::vector<double> seen;
+  std::vector<double> seen, nees, nis;
   for (const FrameRecord& frame : frames) {
+    if (frame.nis && std::isfinite(*frame.nis)) nis.push_back(*frame.nis);
     const auto& error = error_of(frame, has_truth);
     if (!error) continue;
     if (frame.range > 0) seen.push_back(error->seen_position / frame.range);
-    if (!error->nees) continue;
-    ++consistency.count;
-    sum += *error->nees;
-    if (kNeesLower <= *error->nees && *error->nees <= kNeesUpper) ++inside;
+    if (error->nees) nees.push_back(*error->nees);
   }
   consistency.seen_over_range_rms = statistics(seen).rms;
-  if (consistency.count == 0) return consistency;
-  const auto n = static_cast<double>(consistency.count);
-  consistency.mean_nees = sum / n;
-  const int degrees_of_freedom = 6 * static_cast<int>(consistency.count);
-  consistency.lower = chi_square_quantile(0.025, degrees_of_freedom) / n;
-  consistency.upper = chi_square_quantile(0.975, degrees_of_freedom) / n;
-  consistency.fraction_inside = static_cast<double>(inside) / n;
+  consistency.nees = check_normalised(nees);
+  consistency.nis = check_normalised(nis);
   return consistency;
 }
 
@@ -116,6 +80,26 @@ std::optional<TruthScore> score_truth(const std::vector<FrameRecord>& frames) {
   return TruthScore{statistics(position), statistics(rotation), statistics(relative).rms};
 }
 
+Conditions conditions_of(const std::vector<FrameRecord>& frames) {
+  std::vector<double> intervals;
+  for (size_t i = 1; i < frames.size(); ++i)
+    intervals.push_back(1e-9 * static_cast<double>(frames[i].timestamp_ns - frames[i - 1].timestamp_ns));
+  const auto median = [&](const auto& value_of) {
+    std::vector<double> values;
+    for (const FrameRecord& frame : frames) {
+      if (const double value = value_of(frame); std::isfinite(value)) values.push_back(value);
+    }
+    return quantile(std::move(values), 0.5);
+  };
+  const TargetLook unseen{std::nan(""), std::nan(""), std::nan("")};
+  return {.rate_hz = 1 / quantile(intervals, 0.5),
+          .range = median([](const FrameRecord& f) { return f.range; }),
+          .view_angle = median([](const FrameRecord& f) { return f.view_angle; }),
+          .speed = median([](const FrameRecord& f) { return f.speed; }),
+          .white = median([&](const FrameRecord& f) { return f.look.value_or(unseen).white; }),
+          .visible = median([&](const FrameRecord& f) { return f.look.value_or(unseen).visible; })};
+}
+
 }  // namespace
 
 const char* to_string(Comparison comparison) {
@@ -138,16 +122,23 @@ FlightScore score_flight(const FlightResult& result) {
   FlightScore score;
   score.name = result.flight.name;
   score.target = result.target;
+  score.camera = result.camera;
   score.frame_names = result.frame_names;
   score.frame_names.resize(result.estimates.size());
   score.problems = result.flight.problems;
   score.problems.insert(score.problems.end(), result.problems.begin(), result.problems.end());
 
   score.frames.reserve(result.estimates.size());
-  for (const Estimate& estimate : result.estimates) {
+  std::vector<std::optional<VehicleState>> states;
+  for (size_t i = 0; i < result.estimates.size(); ++i) {
+    const Estimate& estimate = result.estimates[i];
     score.frames.push_back(make_frame_record(estimate, result.chain, result.flight));
+    if (i < result.greys.size()) score.frames.back().grey = result.greys[i];
+    if (i < result.looks.size()) score.frames.back().look = result.looks[i];
     if (!estimate.problem.empty()) score.problems.push_back(estimate.problem);
+    states.push_back(estimate.state);
   }
+  score.conditions = conditions_of(score.frames);
   std::vector<const FrameRecord*> compared;
   std::vector<double> reprojection_px;
   for (const FrameRecord& frame : score.frames) {
@@ -156,8 +147,9 @@ FlightScore score_flight(const FlightResult& result) {
   }
   score.comparison = comparison_of(result, !compared.empty());
   score_errors(compared, score);
-  score.bins = bin_by_distance(compared);
   score.truth = score_truth(score.frames);
+  score.curves = error_curves(score.frames, score.truth.has_value());
+  score.touch_down = find_touch_down(score.frames, states);
   score.consistency = check_consistency(score.frames, score.truth.has_value(), result.flight.nav_is_truth);
   score.attribution = attribute_errors(result.estimates, result.chain, result.flight);
   score.reprojection_px = statistics(reprojection_px);

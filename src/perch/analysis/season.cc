@@ -13,7 +13,7 @@ struct Column {
   const char* at;  // in summary.json
 };
 
-constexpr std::array<Column, 11> kColumns{{{"flight", "/flight"},
+constexpr std::array<Column, 20> kColumns{{{"flight", "/flight"},
                                            {"comparison", "/comparison"},
                                            {"frames", "/frames"},
                                            {"ok", "/detection/counts/ok"},
@@ -23,7 +23,16 @@ constexpr std::array<Column, 11> kColumns{{{"flight", "/flight"},
                                            {"rotation_rms_rad", "/errors/rotation_rad/rms"},
                                            {"truth_rms_m", "/truth/position_m/rms"},
                                            {"mean_nees", "/consistency/mean_nees"},
-                                           {"total_us", "/total_us/mean"}}};
+                                           {"mean_nis", "/consistency/mean_nis"},
+                                           {"total_us", "/total_us/mean"},
+                                           {"target", "/target"},
+                                           {"camera", "/conditions/camera"},
+                                           {"rate_hz", "/conditions/rate_hz"},
+                                           {"range_m", "/conditions/median_range_m"},
+                                           {"view_angle_rad", "/conditions/median_view_angle_rad"},
+                                           {"speed_m_s", "/conditions/median_speed_m_s"},
+                                           {"white", "/conditions/median_white"},
+                                           {"visible", "/conditions/median_visible"}}};
 
 // Five digits, more than a page shows.
 Json shown(const Json& value) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
@@ -26,6 +27,14 @@ Statistics statistics(std::span<const double> values);
 // The same of differences of angles, rad: 2 pi more or less changes nothing, and differences that scatter
 // about pi have a mean near pi, not near 0.
 Statistics angle_statistics(std::span<const double> differences);
+
+// The 95 % interval of the RMS of values of which those of one cluster (a second, say) err alike: the mean
+// square's scatter from cluster to cluster, of its logarithm, by Student's t. NaN of fewer than three
+// clusters.
+struct RmsInterval {
+  double low = std::numeric_limits<double>::quiet_NaN(), high = std::numeric_limits<double>::quiet_NaN();
+};
+RmsInterval rms_interval(std::span<const double> values, std::span<const int64_t> clusters);
 
 // The value below which a fraction of the values lies, linear between two of them; NaN of none.
 double quantile(std::vector<double> values, double fraction);

@@ -59,27 +59,55 @@ Json errors_json(const FlightScore& score) {
   return errors;
 }
 
-Json bins_json(const std::vector<DistanceBin>& bins) {
+Json curves_json(const std::vector<ErrorCurve>& curves) {
   Json json = Json::array();
-  for (const DistanceBin& bin : bins) {
-    json.push_back({{"from_m", number(bin.from)},
-                    {"to_m", number(bin.to)},
-                    {"frames", bin.count},
-                    {"position_rms_m", number(bin.position_rms)},
-                    {"position_median_m", number(bin.position_median)},
-                    {"rotation_rms_rad", number(bin.rotation_rms)}});
+  for (const ErrorCurve& curve : curves) {
+    Json bins = Json::array();
+    for (const ErrorBin& bin : curve.bins) {
+      bins.push_back({{"from", number(bin.from)},
+                      {"to", number(bin.to)},
+                      {"frames", bin.count},
+                      {"position_rms_m", number(bin.position_rms)},
+                      {"position_rms_low_m", number(bin.position_low)},
+                      {"position_rms_high_m", number(bin.position_high)},
+                      {"position_median_m", number(bin.position_median)},
+                      {"rotation_rms_rad", number(bin.rotation_rms)}});
+    }
+    json.push_back({{"by", curve.by}, {"unit", curve.unit}, {"bins", bins}});
   }
   return json;
+}
+
+Json touch_down_json(const std::optional<TouchDown>& touch_down) {
+  if (!touch_down) return nullptr;
+  Json bins = Json::array();
+  for (const ForecastBin& bin : touch_down->bins) {
+    bins.push_back({{"from_s", bin.from},
+                    {"to_s", bin.to},
+                    {"frames", bin.count},
+                    {"place_rms_m", number(bin.place_rms)},
+                    {"place_median_m", number(bin.place_median)},
+                    {"time_rms_s", number(bin.time_rms)},
+                    {"time_mean_s", number(bin.time_mean)}});
+  }
+  return {{"at_s", number(touch_down->time)},
+          {"height_m", number(touch_down->height)},
+          {"place_m", {number(touch_down->place.x()), number(touch_down->place.y())}},
+          {"forecasts", bins}};
 }
 
 Json consistency_json(const Consistency& c) {
   return {{"reference", c.by_truth ? "truth" : "navigation"},
           {"target_in_camera_over_range_rms", number(c.seen_over_range_rms)},
-          {"frames", c.count},
-          {"mean_nees", number(c.mean_nees)},
+          {"frames", c.nees.count},
+          {"mean_nees", number(c.nees.mean)},
           {"expected_nees", 6},
-          {"mean_nees_bounds_95", {number(c.lower), number(c.upper)}},
-          {"fraction_of_frames_inside_95", number(c.fraction_inside)}};
+          {"mean_nees_bounds_95", {number(c.nees.lower), number(c.nees.upper)}},
+          {"fraction_of_frames_inside_95", number(c.nees.fraction_inside)},
+          {"innovations", c.nis.count},
+          {"mean_nis", number(c.nis.mean)},
+          {"mean_nis_bounds_95", {number(c.nis.lower), number(c.nis.upper)}},
+          {"fraction_of_innovations_inside_95", number(c.nis.fraction_inside)}};
 }
 
 Json truth_json(const std::optional<TruthScore>& truth) {
@@ -138,6 +166,17 @@ std::string csv_number(double value) {
   return text;
 }
 
+Json conditions_json(const FlightScore& score) {
+  const Conditions& c = score.conditions;
+  return {{"camera", score.camera},
+          {"rate_hz", number(c.rate_hz)},
+          {"median_range_m", number(c.range)},
+          {"median_view_angle_rad", number(c.view_angle)},
+          {"median_speed_m_s", number(c.speed)},
+          {"median_white", number(c.white)},
+          {"median_visible", number(c.visible)}};
+}
+
 }  // namespace
 
 nlohmann::ordered_json summary_json(const FlightScore& score) {
@@ -151,11 +190,13 @@ nlohmann::ordered_json summary_json(const FlightScore& score) {
           {"frames", score.frames.size()},
           {"start_ns", score.frames.empty() ? Json(nullptr) : Json(score.frames.front().timestamp_ns)},
           {"duration_s", number(duration)},
+          {"conditions", conditions_json(score)},
           {"detection", detection_json(score.detections)},
           {"comparison", to_string(score.comparison)},
           {"compared_frames", compared},
           {"errors", errors_json(score)},
-          {"distance_bins", bins_json(score.bins)},
+          {"error_curves", curves_json(score.curves)},
+          {"touch_down", touch_down_json(score.touch_down)},
           {"truth", truth_json(score.truth)},
           {"consistency", consistency_json(score.consistency)},
           {"attribution", attribution_json(score.attribution)},
@@ -187,6 +228,7 @@ const std::vector<SummaryColumn>& summary_columns() {
     c.push_back({"position_over_range_rms", "[]", At("/errors/position_over_range_rms")});
     c.push_back({"mean_nees", "[]", At("/consistency/mean_nees")});
     c.push_back({"nees_inside_95", "[]", At("/consistency/fraction_of_frames_inside_95")});
+    c.push_back({"mean_nis", "[]", At("/consistency/mean_nis")});
     c.push_back({"reprojection_rms", "[px]", At("/reprojection_rms_px/rms")});
     c.push_back({"total_mean", "[us]", At("/total_us/mean")});
     c.push_back({"total_p99", "[us]", At("/total_us/p99")});

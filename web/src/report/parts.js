@@ -25,3 +25,16 @@ export function redrawWhenColoursChange(show) {
   addEventListener('beforeprint', () => { document.documentElement.classList.add('paper-page'); show(); });
   addEventListener('afterprint', () => { document.documentElement.classList.remove('paper-page'); show(); });
 }
+
+/**
+ * A histogram's columns, in HTML: they print and fit any width.
+ * @param {{title: string, counts: number[], behind?: number[], tip: (i: number) => string, ends: string[]}} what
+ */
+export function histogramFigure(what) {
+  const {title, counts, behind, tip, ends} = what;
+  const most = Math.max(...counts, ...(behind || []));
+  const height = (n) => `${(100 * n / most).toFixed(1)}%`;
+  return element('figure', {class: 'histogram'}, element('b', {}, title),
+      element('div', {class: 'columns'}, ...counts.map((n, i) => element('i', {title: tip(i)}, element('b', {style: 'height:' + height(n)}), behind ? element('u', {style: 'height:' + height(behind[i])}) : null))),
+      element('div', {class: 'ends'}, ...ends.map((end) => element('span', {}, end))));
+}

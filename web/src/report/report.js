@@ -3,10 +3,12 @@ import {element, legend} from '../common/element.js';
 import {DEG, short} from '../common/format.js';
 import {STATES, STATUSES, isAngle} from '../common/names.js';
 import {theme} from '../common/theme.js';
-import {TimeGroup, gapsOf, line, scatterPlot, shadeGaps, statusStrip, timePlot} from '../views/plots.js';
+import {consistencyPlot} from '../views/consistency.js';
+import {greyPlot} from '../views/grey.js';
+import {TimeGroup, errorScatter, gapsOf, line, shadeGaps, statusStrip, timePlot} from '../views/plots.js';
 import {StatePlots} from '../views/state_plots.js';
 import {Scene} from '../views/scene.js';
-import {redrawWhenColoursChange, section, table, tileRow} from './parts.js';
+import {histogramFigure, redrawWhenColoursChange, section, table, tileRow} from './parts.js';
 import {seasonPage} from './season.js';
 
 const shownScale = (i) => (isAngle(i) ? DEG : 100);  // rad to degrees, m to cm
@@ -153,14 +155,58 @@ function errorTable(summary) {
       table(['', 'RMS', 'DC offset', 'RMS without it', 'median', '95 %', 'largest'], rows));
 }
 
-function distances(flight) {
+// What errors may depend on: where the frames have it, and how it is shown.
+const CURVES = {
+  distance: {column: 'range_m', words: 'distance', label: 'distance camera to target [m]', scale: 1, unit: ' m'},
+  view_angle: {column: 'view_angle_deg', words: 'view angle', label: 'angle to the target’s normal [°]', scale: DEG, unit: '°'},
+  visible: {column: 'visible', words: 'visible', label: 'visible part of the target', scale: 1, unit: ''},
+  speed: {column: 'speed_m_s', words: 'speed', label: 'speed, by navigation [m/s]', scale: 1, unit: ' m/s'},
+};
+
+function errorCurves(flight) {
   const {summary, frames} = flight;
+  const curves = summary.error_curves.filter((curve) => curve.bins.length);
+  const byTruth = summary.truth != null;
+  const figures = curves.map((curve) => {
+    const {column, label, scale, unit} = CURVES[curve.by];
+    const parent = element('figure', {class: 'wide'});
+    flight.draw.push(() => errorScatter(parent, {x: frames[column], y: frames.position_error_cm, label, unit, errorLabel: 'position error [cm]', errorUnit: ' cm',
+      bins: curve.bins.map((b) => ({from: scale * b.from, to: scale * b.to, rms: scaled(b.position_rms_m, 100), low: scaled(b.position_rms_low_m, 100), high: scaled(b.position_rms_high_m, 100)}))}));
+    return parent;
+  });
+  const edge = (value) => String(+value.toPrecision(6));
+  const rows = curves.flatMap((curve) => curve.bins.filter((b) => b.frames).map((b) => {
+    const {words, scale, unit} = CURVES[curve.by];
+    return [`${words} ${edge(scale * b.from)} – ${edge(scale * b.to)}${unit}`, String(b.frames), cm(b.position_rms_m),
+            b.position_rms_low_m == null ? '–' : `${short(100 * b.position_rms_low_m)} – ${cm(b.position_rms_high_m)}`, cm(b.position_median_m), deg(b.rotation_rms_rad)];
+  }));
+  return section('What the error depends on', `Against ${byTruth ? 'the flight’s exact truth' : 'navigation'}. The band is the RMS’s 95 % interval, by how it varies from second to second; there is none of less than three seconds.`,
+      legend([['background:var(--vision);width:.5em;height:.5em;border-radius:50%', 'a frame'], ['background:var(--text)', 'RMS of a bin'], ['background:var(--band);height:.8em', '95 % interval']]),
+      element('div', {class: 'pairs'}, ...figures),
+      element('details', {}, element('summary', {}, 'In numbers'), table(['', 'frames', 'position RMS', '95 % interval', 'median', 'attitude RMS'], rows)));
+}
+
+function touchDown(flight) {
+  const {touch_down: down} = flight.summary, {forecasts} = flight;
+  const figure = (values, label, unit) => {
+    const parent = element('figure', {class: 'wide'});
+    const largest = Math.max(...forecasts.to_go_s, 0.1);
+    flight.draw.push(() => errorScatter(parent, {x: forecasts.to_go_s, y: values, label: 'before touch-down [s]', unit: ' s', errorLabel: label, errorUnit: unit, height: 200,
+      bins: [{from: 0, to: largest, rms: null, low: null, high: null}]}));
+    return parent;
+  };
+  return section('Touch-down foretold', `Navigation has the body on the pad at ${short(down.at_s)} s, at x ${short(100 * down.place_m[0])}, y ${short(100 * down.place_m[1])} cm. Each frame’s state, going on as it then moved, says where and when that will be; this is how far off it was. Close to the ground it is what a landing acts on.`,
+      forecasts.to_go_s.length ? element('div', {class: 'pairs'}, figure(forecasts.place_cm, 'place off by [cm]', ' cm'), figure(forecasts.time_s.map(Math.abs), 'time off by [s]', ' s')) : element('p', {class: 'note'}, 'No state of the last ten seconds came down.'),
+      down.forecasts.length ? table(['before touch-down', 'frames', 'place RMS', 'median', 'time RMS', 'mean, late is above 0'], down.forecasts.map((f) =>
+          [`${f.from_s} – ${f.to_s} s`, String(f.frames), cm(f.place_rms_m), cm(f.place_median_m), short(f.time_rms_s) + ' s', signed(f.time_mean_s) + ' s'])) : null);
+}
+
+function greyLevels(flight, group) {
+  const {frames} = flight;
   const parent = element('figure', {class: 'wide'});
-  flight.draw.push(() => scatterPlot(parent, frames.range_m, frames.position_error_cm, summary.distance_bins));
-  return section('Error against distance', null,
-      legend([['background:var(--vision);width:.5em;height:.5em;border-radius:50%', 'a frame'], ['background:var(--text)', 'RMS of a bin']]), parent,
-      table(['distance', 'frames', 'position RMS', 'median', 'attitude RMS'], summary.distance_bins.map((b) =>
-          [`${+b.from_m.toPrecision(6)} – ${+b.to_m.toPrecision(6)} m`, String(b.frames), cm(b.position_rms_m), cm(b.position_median_m), deg(b.rotation_rms_rad)])));
+  const {time_s: times, threshold, white, black, grey} = frames;
+  flight.draw.push(() => greyPlot(parent, group, {times, threshold, white, black, grey}));
+  return section('Light', 'The paper’s plot_hist over the flight: how dark or light the pictures are, deeper where more pixels are of that grey; what the target’s white and black are in them; and the threshold, in the frames in which the method took one.', parent);
 }
 
 function detectionTimeline(flight, group) {
@@ -190,27 +236,43 @@ function attributionTable({attribution: a}) {
           [cause.cause, values(cause), percent(cause.alone_explains), percent(cause.only_it_explains)])));
 }
 
-function consistencyPlot(flight, group) {
-  const {summary, frames} = flight;
-  const c = summary.consistency;
-  const parent = element('figure', {class: 'wide'});
-  const constant = (value) => frames.time_s.map(() => value);
-  const dashed = (label, dash) => ({label, stroke: theme('muted'), width: 1, dash, points: {show: false}, value: (p, v) => short(v)});
-  flight.draw.push(() => timePlot(parent, group, {
-    label: 'NEES', height: 230,
-    scales: {y: {distr: 3}},
-    drawUnder: shadeGaps(gapsOf(frames.time_s, frames.status)),
-    series: [dashed('2.5 %', [2, 4]), dashed('97.5 %', [2, 4]), dashed('expected', [8, 4]),
-             line('NEES', theme('vision'), frames.time_s.length)],
-    data: [frames.time_s, constant(1.2373), constant(14.4494), constant(6), frames.nees.map((v) => (v > 0 ? v : null))],
-  }));
-  const [low, high] = c.mean_nees_bounds_95;
-  const byTruth = c.reference === 'truth';
-  const verdict = c.mean_nees > high ? (byTruth ? 'vision is less accurate than it claims.' : 'vision is less accurate than it claims, or navigation is the noisier: its noise counts as vision’s here.') : c.mean_nees < low ? 'vision is more accurate than it claims.' : 'as honest as it can be told.';
-  return section('Consistency', `Against ${byTruth ? 'the flight’s exact truth' : 'navigation'}: mean NEES ${short(c.mean_nees)} over ${plural(c.frames, 'frame')}; an honest covariance gives 6, with independent frames within ${short(low)} to ${short(high)} 95 times of 100: ${verdict} Within the single frame’s bounds, 1.24 to 14.4: ${percent(c.fraction_of_frames_inside_95)} (95 % when honest).`, parent);
+function consistency(flight, group) {
+  const {summary: {consistency: c}, frames} = flight;
+  const parts = [];
+  const show = (label, values) => {
+    const parent = element('figure', {class: 'wide'});
+    flight.draw.push(() => consistencyPlot(parent, group, {label, times: frames.time_s, values, gaps: gapsOf(frames.time_s, frames.status)}));
+    parts.push(parent);
+  };
+  const totals = (mean, [low, high], inside) => `an honest covariance gives 6, with independent frames within ${short(low)} to ${short(high)} 95 times of 100; within the single frame’s bounds, 1.24 to 14.4: ${percent(inside)} (95 % when honest).`;
+  const judge = (mean, [low, high], worse, better) => (mean > high ? worse : mean < low ? better : 'As honest as it can be told.');
+  if (c.mean_nees != null) {
+    const byTruth = c.reference === 'truth';
+    const verdict = judge(c.mean_nees, c.mean_nees_bounds_95, byTruth ? 'Vision is less accurate than it claims.' : 'Vision is less accurate than it claims, or navigation is the noisier: its noise counts as vision’s here.', 'Vision is more accurate than it claims.');
+    parts.push(element('p', {class: 'note'}, `NEES: vision against ${byTruth ? 'the flight’s exact truth' : 'navigation'}. Mean ${short(c.mean_nees)} over ${plural(c.frames, 'frame')}; ${totals(c.mean_nees, c.mean_nees_bounds_95, c.fraction_of_frames_inside_95)} ${verdict}`));
+    show('NEES', frames.nees);
+  }
+  if (c.mean_nis != null) {
+    const verdict = judge(c.mean_nis, c.mean_nis_bounds_95, 'Poses jump more than vision claims and the motion allows for.', 'Vision and the motion allow for more than happens.');
+    parts.push(element('p', {class: 'note'}, `NIS: each pose against what the filter expected, which needs no reference. Mean ${short(c.mean_nis)} over ${plural(c.innovations, 'frame')}; ${totals(c.mean_nis, c.mean_nis_bounds_95, c.fraction_of_innovations_inside_95)} ${verdict}`));
+    show('NIS', frames.nis);
+  }
+  return section('Consistency', null, legend([['background:var(--vision);width:.5em;height:.5em;border-radius:50%', 'a frame'], ['background:var(--navigation)', 'running mean of 25'], ['background:var(--muted);height:1px', 'bounds: dotted of a frame, dashed of the mean']]), ...parts);
 }
 
-function stageTable(summary) {
+function latencies(frames) {
+  const values = frames.total_us.filter((us, i) => us > 0 && frames.status[i] !== '5').sort((a, b) => a - b);
+  if (values.length < 2) return null;
+  const low = values[0], high = values[values.length - 1], bins = 48;
+  const step = Math.log(high / low) / bins || 1;
+  const counts = new Array(bins).fill(0);
+  for (const us of values) counts[Math.min(bins - 1, Math.floor(Math.log(us / low) / step))]++;
+  const edge = (i) => ms(low * Math.exp(i * step));
+  return histogramFigure({title: 'Time a frame, on a logarithmic scale', counts, tip: (i) => `${plural(counts[i], 'frame')}: ${edge(i)} to ${edge(i + 1)}`,
+                          ends: [ms(low), 'median ' + ms(values[values.length >> 1]), ms(high)]});
+}
+
+function stageTable({summary, frames}) {
   const stages = summary.stages;
   const most = Math.max(...stages.map((s) => s.share || 0), 1e-9);
   const bar = (share) => element('span', {class: 'share'}, element('i', {style: `width:${(100 * share / most).toFixed(1)}%`}), percent(share));
@@ -218,7 +280,7 @@ function stageTable(summary) {
   const t = summary.total_us;
   rows.push(['total', short(t.mean), short(t.median), short(t.p99), '', percent(1)]);
   return section('Cost of each stage', 'The paper’s table 3.2; there segmentation and threshold took 72 % and all image processing 90 % of 33 ms on a 233 MHz Pentium. Mean, median and 99 % are of the frames in which a stage ran.',
-      table(['stage', 'mean µs', 'median µs', '99 % µs', 'frames', 'share of the total'], rows, {class: 'stages'}));
+      latencies(frames), table(['stage', 'mean µs', 'median µs', '99 % µs', 'frames', 'share of the total'], rows, {class: 'stages'}));
 }
 
 function pictureStrip(pictures, compared) {
@@ -252,12 +314,16 @@ function flightPage(flight, index) {
       element('h2', {}, summary.flight || 'flight', summary.target ? element('small', {}, summary.target) : null),
       element('p', {class: 'lead'}, inWords(summary)),
       compared ? null : element('p', {class: 'notice'}, WHY_NOT_COMPARED[summary.comparison] || `Nothing to compare with: ${summary.comparison}. Vision alone is shown.`),
-      tiles(summary));
+      tiles(summary),
+      frames.each > 1 ? element('p', {class: 'notice'}, `A long flight: of every ${frames.each} frames the worst is plotted. Numbers and the Light are of all.`) : null);
   if (frames.time_s.length) page.append(statePlots(flight, group), flightScene(flight), detectionTimeline(flight, group));
-  if (compared) page.append(rmsBars(summary), errorTable(summary), residualPlots(flight, group), distances(flight));
+  if (compared) page.append(rmsBars(summary), errorTable(summary), residualPlots(flight, group));
+  if (summary.error_curves.some((curve) => curve.bins.length)) page.append(errorCurves(flight));
+  if (summary.touch_down) page.append(touchDown(flight));
   if (summary.attribution) page.append(attributionTable(summary));
-  if (summary.consistency.mean_nees != null) page.append(consistencyPlot(flight, group));
-  if (summary.stages.length) page.append(stageTable(summary));
+  if (summary.consistency.mean_nees != null || summary.consistency.mean_nis != null) page.append(consistency(flight, group));
+  if (frames.grey) page.append(greyLevels(flight, group));
+  if (summary.stages.length) page.append(stageTable(flight));
   if (pictures.length) page.append(pictureStrip(pictures, compared));
   page.append(problemList(summary.problems));
   return page;
@@ -266,10 +332,10 @@ function flightPage(flight, index) {
 function main() {
   const root = /** @type {HTMLElement} */ (document.getElementById('report'));
   const json = (id) => JSON.parse(document.getElementById(id)?.textContent ?? 'null');
-  const configuration = json('configuration'), season = json('season');
+  const configuration = json('configuration'), season = json('season'), before = json('before');
   const parsed = [...document.querySelectorAll('script.flight')].map((source) => JSON.parse(source.textContent));
   const many = season && season.flight.length > 1 ? season : null;
-  root.append(element('header', {}, element('h1', {}, many ? 'Perch season report' : 'Perch flight report')));
+  root.replaceChildren(element('header', {}, element('h1', {}, many ? 'Perch season report' : 'Perch flight report')));
   const place = element('div');
   let shown = 0;
 
@@ -289,7 +355,7 @@ function main() {
 
   // Few flights are in this page, many have pages of their own.
   const inPage = many && parsed.length === many.flight.length;
-  const overview = many ? seasonPage(many, (i) => (inPage ? '#' + i : encodeURIComponent(many.flight[i]) + '/report.html'), inPage ? choose : null) : null;
+  const overview = many ? seasonPage(many, before, (i) => (inPage ? '#' + i : encodeURIComponent(many.flight[i]) + '/report.html'), inPage ? choose : null) : null;
   if (overview) root.append(overview.element);
   root.append(place);
   if (configuration) root.append(element('details', {}, element('summary', {}, 'Configuration'), element('pre', {}, configuration)));

@@ -149,35 +149,47 @@ export function statusStrip(parent, group, times, status) {
   });
 }
 
-// Error against distance: a point a frame, and the RMS of each bin as a step over it.
-export function scatterPlot(parent, ranges, errors, bins) {
-  const order = ranges.map((r, i) => i).filter((i) => ranges[i] != null && errors[i] != null);
-  order.sort((a, b) => ranges[a] - ranges[b]);
+/**
+ * Errors against something: a point a frame, and of each bin the RMS as a step with its 95 % interval as a band.
+ * @param {{x: (number|null)[], y: (number|null)[], label: string, errorLabel: string, unit: string, errorUnit: string, height?: number,
+ *          bins: {from: number, to: number, rms: number|null, low: number|null, high: number|null}[]}} what
+ */
+export function errorScatter(parent, what) {
+  const {x, y, bins} = what;
+  const points = x.flatMap((v, i) => (v != null && y[i] != null ? [{x: v, y: Number(y[i])}] : []));
+  points.sort((a, b) => a.x - b.x);
+  const shown = bins.filter((bin) => bin.rms != null);
   const drawBins = (plot) => {
-    const {ctx} = plot;
+    const {ctx, bbox} = plot;
+    const at = (v, scale) => plot.valToPos(v, scale, true);
     ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
     ctx.strokeStyle = theme('text');
+    ctx.fillStyle = theme('band');
     ctx.lineWidth = 2.5 * devicePixelRatio;
-    for (const bin of bins) {
-      if (bin.position_rms_m == null) continue;
-      const y = plot.valToPos(100 * bin.position_rms_m, 'y', true);
+    for (const bin of shown) {
+      const left = at(bin.from, 'x'), right = at(bin.to, 'x');
+      if (bin.low != null) ctx.fillRect(left, at(bin.high, 'y'), right - left, at(bin.low, 'y') - at(bin.high, 'y'));
       ctx.beginPath();
-      ctx.moveTo(plot.valToPos(bin.from_m, 'x', true), y);
-      ctx.lineTo(plot.valToPos(bin.to_m, 'x', true), y);
+      ctx.moveTo(left, at(bin.rms, 'y'));
+      ctx.lineTo(right, at(bin.rms, 'y'));
       ctx.stroke();
     }
     ctx.restore();
   };
-  const low = bins[0].from_m, high = bins[bins.length - 1].to_m;
+  // One wild bin's interval would flatten all the others.
+  const most = points.concat(shown.map((bin) => ({x: 0, y: Number(bin.rms)}))).reduce((top, point) => Math.max(top, point.y), 0);
   place(parent, {
-    height: 300,
-    scales: {x: {time: false, range: [low, high]},
-             y: {range: (plot, min, max) => [0, (max || 1) * 1.05]}},
-    axes: [axis('distance camera to target [m]', {size: 28}), yAxis('position error [cm]')],
-    series: [{label: 'distance', value: (plot, v) => short(v) + ' m'},
-             {label: 'position error', stroke: theme('vision'), paths: () => null,
-              points: {show: true, size: 4, fill: theme('vision'), stroke: theme('vision'), width: 0}, value: (plot, v) => short(v) + ' cm'}],
+    height: what.height || 240,
+    scales: {x: {time: false, range: [bins[0].from, bins[bins.length - 1].to]},
+             y: {range: [0, (most || 1) * 1.05]}},
+    axes: [axis(what.label, {size: 28}), yAxis(what.errorLabel)],
+    series: [{label: what.label.replace(/ \[.*/, ''), value: (plot, v) => short(v) + what.unit},
+             {label: 'error', stroke: theme('vision'), paths: () => null,
+              points: {show: true, size: points.length > 1000 ? 3 : 4, fill: theme('vision'), stroke: theme('vision'), width: 0}, value: (plot, v) => short(v) + what.errorUnit}],
     cursor: {drag: {x: false, y: false}},
     hooks: {draw: [drawBins]},
-  }, [order.map((i) => ranges[i]), order.map((i) => errors[i])]);
+  }, [points.map((p) => p.x), points.map((p) => p.y)]);
 }
