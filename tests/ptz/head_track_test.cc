@@ -69,6 +69,55 @@ TEST(HeadTrack, DoubtsAJumpUntilItIsConfirmed) {
   EXPECT_NEAR(track.at(1330 * kMs).value().pan, 50 * kDeg, 1e-9);
 }
 
+// One of the three that were to confirm a jump is garbled, too: by 8 counts.
+TEST(HeadTrack, ThreeThatConfirmLieOnOneMotion) {
+  HeadTrack track = resting();
+  const double angles[] = {50, 50.91, 50, 50, 50};
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(track.add((1160 + 40 * i) * kMs, 0.001, angles[i] * kDeg, 5 * kDeg),
+              i < 4 ? Verdict::kWaits : Verdict::kUsed);
+  EXPECT_NEAR(track.at(1290 * kMs).value().pan, 50 * kDeg, 1e-9);
+}
+
+// Half a degree is within what a change of speed excuses.
+TEST(HeadTrack, OnALineThatGarblesThreeReportsTell) {
+  HeadTrack track = resting();
+  EXPECT_TRUE(track.confirmed_at(1110 * kMs));
+  EXPECT_FALSE(track.confirmed_at(1130 * kMs));  // beyond the last report
+  track.moves(1121 * kMs, {HeadGoal::Kind::kDrive, 20 * kDeg, 0});
+  const auto add = [&](int64_t ms, double pan) { return track.add(ms * kMs, 0.001, pan * kDeg, 5 * kDeg); };
+  EXPECT_EQ(add(1160, 10.8 + 0.45), Verdict::kUsed);  // garbled by four counts
+  EXPECT_TRUE(track.at(1150 * kMs));
+  EXPECT_FALSE(track.confirmed_at(1150 * kMs));
+  EXPECT_EQ(add(1200, 11.6), Verdict::kUsed);
+  EXPECT_FALSE(track.confirmed_at(1150 * kMs));
+  EXPECT_FALSE(track.confirmed_at(1190 * kMs));  // the three are on no line
+  EXPECT_EQ(add(1240, 12.4), Verdict::kUsed);
+  EXPECT_EQ(add(1280, 13.2), Verdict::kUsed);
+  EXPECT_NEAR(track.confirmed_at(1250 * kMs).value().pan, 12.6 * kDeg, 1e-9);
+  EXPECT_FALSE(track.confirmed_at(1150 * kMs));
+}
+
+// A drive that became another on its way: 13.3 degrees/s in place of 20. Garbled reports may do that, too.
+TEST(HeadTrack, OnALineThatGarblesAnotherMotionNeedsFive) {
+  HeadTrack track = resting();
+  track.moves(1121 * kMs, {HeadGoal::Kind::kDrive, 20 * kDeg, 0});
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_FALSE(track.confirmed_at(1190 * kMs)) << i;
+    track.add((1160 + 40 * i) * kMs, 0.001, (10.52 + 0.533 * i) * kDeg, 5 * kDeg);
+  }
+  EXPECT_NEAR(track.confirmed_at(1300 * kMs).value().pan, (10.52 + 0.533 * 3.5) * kDeg, 1e-3);
+}
+
+TEST(HeadTrack, OnALineThatGarblesACommandNobodyAcknowledgedMayWork) {
+  HeadTrack track = resting();
+  track.may_move(1125 * kMs, 1150 * kMs);
+  EXPECT_EQ(track.add(1160 * kMs, 0.001, 10 * kDeg, 5 * kDeg), Verdict::kUsed);
+  EXPECT_TRUE(track.at(1140 * kMs));
+  EXPECT_FALSE(track.confirmed_at(1140 * kMs));
+  EXPECT_TRUE(track.confirmed_at(1110 * kMs));
+}
+
 TEST(HeadTrack, RefusesWhatNoHeadSays) {
   HeadTrack track = resting();
   EXPECT_EQ(track.add(1160 * kMs, 0.005, 101 * kDeg, 0), Verdict::kRefused);

@@ -36,13 +36,32 @@ class HeadControl {
     HeadGoal goal;  // kDrive
     bool searching = false;
   };
-  // `state`: of the last picture. `world_from_body`: the attitude now, where it is known. No move when the
-  // head does not say where it is: a search in the dark finds nothing.
+  // Where a picture shows the target, though nobody knows the head's angles well enough to measure with them.
+  struct Glimpse {
+    int64_t time_ns = 0;
+    Eigen::Vector3d target_in_camera = Eigen::Vector3d::Zero();
+  };
+  // `state`: of the last picture. `glimpse`: followed where there is no state. `world_from_body`: the
+  // attitude now, where it is known. No move when the head does not say where it is: a search in the dark
+  // finds nothing.
   std::optional<Move> update(int64_t now_ns, const std::optional<VehicleState>& state,
-                             const std::optional<Eigen::Quaterniond>& world_from_body, const PtzCamera& head);
+                             const std::optional<Eigen::Quaterniond>& world_from_body, const PtzCamera& head,
+                             const std::optional<Glimpse>& glimpse = {});
 
   // What centres the target at a time; empty when no angles do.
   std::optional<HeadAngles> centring(const VehicleState& state, int64_t time_ns) const;
+
+  // The lens at another zoom: the dead band is a part of the picture.
+  void look_through(const CameraModel& camera);
+
+  // How far the target is and how fast it comes nearer, and how far off the middle it is or may get before
+  // the head has followed. Empty when nobody knows.
+  struct Sight {
+    double distance = 0;  // m
+    double closing = 0;   // m/s
+    double aside = 0;     // rad
+  };
+  std::optional<Sight> sight(const VehicleState& state, int64_t now_ns, const PtzCamera& head) const;
 
  private:
   struct Seen {
@@ -56,12 +75,15 @@ class HeadControl {
   std::optional<HeadAngles> centring(const Eigen::Vector3d& target_in_body) const;
   void remember(const VehicleState& state, int64_t now_ns,
                 const std::optional<Eigen::Quaterniond>& world_from_body);
+  bool remember(const Glimpse& glimpse, int64_t now_ns,
+                const std::optional<Eigen::Quaterniond>& world_from_body, const PtzCamera& head);
   HeadAngles expected(int64_t time_ns, const std::optional<Eigen::Quaterniond>& world_from_body) const;
   double speed(const AxisLimits& axis, double goal, double goal_rate, double angle) const;
 
   FrameChain chain_;
   Rigid3 zero_from_body_;
   Eigen::Vector3d middle_ray_;
+  double widest_, view_;  // the smaller angle of the picture at first, and now, rad
   HeadModel model_;
   HeadControlOptions options_;
   SearchPattern search_;

@@ -14,6 +14,8 @@ constexpr double kSpeedSigma = 0.05;
 // After a change of speed the motor takes that long to the middle of its ramp, and a report may be that far
 // off.
 constexpr double kRamp = 0.08;  // s
+// The moment from which a command that was acknowledged works, sooner or later than thought.
+constexpr int64_t kSooner = 5'000'000, kLater = 10'000'000;
 
 double seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 int64_t nanoseconds(double s) { return std::llround(s * 1e9); }
@@ -24,9 +26,16 @@ void HeadTrack::clear() {
   reports_.clear();
   suspects_.clear();
   motions_.clear();
+  changes_.clear();
+}
+
+void HeadTrack::may_move(int64_t from_ns, int64_t to_ns) {
+  changes_.push_back({from_ns, to_ns});
+  if (changes_.size() > kMotions) changes_.pop_front();
 }
 
 void HeadTrack::moves(int64_t time_ns, const HeadGoal& goal) {
+  may_move(time_ns - kSooner, time_ns + kLater);
   Motion motion{time_ns, goal};
   if (goal.kind == HeadGoal::Kind::kRelative) {
     const auto now = at(time_ns);
@@ -98,14 +107,27 @@ bool HeadTrack::reachable(const Axis& axis, const Report& a, const Report& b) co
          1.1 * axis.limits->max_speed * dt + 2 * axis.limits->count;
 }
 
+// How far b may be from where the commanded motion leads to from a.
+double HeadTrack::tolerance(const Axis& axis, const Report& a, const Report& b) const {
+  const double dt = seconds(b.time_ns - a.time_ns);
+  const double times = 3 * (a.time_sigma + b.time_sigma) + kSpeedSigma * dt;
+  return 2 * axis.limits->count + times * fastest(axis, a.time_ns, b.time_ns) +
+         kRamp * change_near(axis, a.time_ns, b.time_ns, 2 * kRamp);
+}
+
 bool HeadTrack::expected(const Axis& axis, const Report& report) const {
   const Report& last = reports_.back();
   const double angle = moved(axis, last.*axis.angle, last.time_ns, report.time_ns);
-  const double dt = seconds(report.time_ns - last.time_ns);
-  const double times = 3 * (last.time_sigma + report.time_sigma) + kSpeedSigma * dt;
-  const double within = 2 * axis.limits->count + times * fastest(axis, last.time_ns, report.time_ns) +
-                        kRamp * change_near(axis, last.time_ns, report.time_ns, 2 * kRamp);
-  return std::abs(report.*axis.angle - angle) <= within;
+  return std::abs(report.*axis.angle - angle) <= tolerance(axis, last, report);
+}
+
+// Whether b is where a motion from a to c passes that is off the commanded one by a constant speed.
+bool HeadTrack::on_one_motion(const Axis& axis, const Report& a, const Report& b, const Report& c) const {
+  if (!reachable(axis, a, b) || !reachable(axis, b, c)) return false;
+  const double s = seconds(b.time_ns - a.time_ns) / seconds(c.time_ns - a.time_ns);
+  const double off = c.*axis.angle - moved(axis, a.*axis.angle, a.time_ns, c.time_ns);
+  const double angle = moved(axis, a.*axis.angle, a.time_ns, b.time_ns) + s * off;
+  return std::abs(b.*axis.angle - angle) <= tolerance(axis, a, c) / 2;
 }
 
 HeadTrack::Verdict HeadTrack::add(int64_t time_ns, double time_sigma, double pan_angle, double tilt_angle) {
@@ -121,20 +143,17 @@ HeadTrack::Verdict HeadTrack::add(int64_t time_ns, double time_sigma, double pan
 }
 
 HeadTrack::Verdict HeadTrack::suspect(const Report& report) {
-  if (!suspects_.empty()) {
-    const Report& last = suspects_.back();
-    const bool follows = report.time_ns > last.time_ns &&
-                         seconds(report.time_ns - last.time_ns) <= kMostGap &&
-                         reachable(pan(), last, report) && reachable(tilt(), last, report);
-    if (!follows) suspects_.clear();
-  }
+  if (!suspects_.empty() && (report.time_ns <= suspects_.back().time_ns ||
+                             seconds(report.time_ns - suspects_.back().time_ns) > kMostGap))
+    suspects_.clear();
   suspects_.push_back(report);
-  if (suspects_.size() < kConfirmed) return Verdict::kWaits;
+  if (suspects_.size() > 3) suspects_.pop_front();
+  if (suspects_.size() < 3) return Verdict::kWaits;
+  const Report &a = suspects_[0], &b = suspects_[1], &c = suspects_[2];
+  if (!on_one_motion(pan(), a, b, c) || !on_one_motion(tilt(), a, b, c)) return Verdict::kWaits;
   // It moves otherwise than it was told, for all that is known as it did just now.
-  const Report& first = suspects_.front();
-  const double dt = seconds(report.time_ns - first.time_ns);
-  moves(first.time_ns,
-        {HeadGoal::Kind::kDrive, (report.pan - first.pan) / dt, (report.tilt - first.tilt) / dt});
+  const double dt = seconds(c.time_ns - a.time_ns);
+  moves(a.time_ns, {HeadGoal::Kind::kDrive, (c.pan - a.pan) / dt, (c.tilt - a.tilt) / dt});
   reports_.insert(reports_.end(), suspects_.begin(), suspects_.end());
   while (reports_.size() > kReports) reports_.pop_front();
   suspects_.clear();
@@ -190,6 +209,49 @@ std::optional<HeadAngles> HeadTrack::at(int64_t time_ns) const {
   return HeadAngles{pan_guess.angle, tilt_guess.angle,
                     std::hypot(pan_guess.sigma, rounding * model_.pan.count),
                     std::hypot(tilt_guess.sigma, rounding * model_.tilt.count)};
+}
+
+// The reports from the one to the other are on a line in time, and nothing that would bend it.
+bool HeadTrack::straight(size_t from, size_t to) const {
+  if (to >= reports_.size()) return false;
+  const Report &a = reports_[from], &c = reports_[to];
+  for (const Window& change : changes_) {
+    if (change.from_ns < c.time_ns && change.to_ns > a.time_ns) return false;
+  }
+  const auto on_line = [&](const Axis& axis, const Report& b) {
+    const double speed = (c.*axis.angle - a.*axis.angle) / seconds(c.time_ns - a.time_ns);
+    const double off = b.*axis.angle - a.*axis.angle - seconds(b.time_ns - a.time_ns) * speed;
+    // Rounding of the three, and their moments.
+    return std::abs(off) <= axis.limits->count + 3 * std::abs(speed) * std::max(a.time_sigma, b.time_sigma);
+  };
+  for (size_t i = from + 1; i <= to; ++i) {
+    if (seconds(reports_[i].time_ns - reports_[i - 1].time_ns) > kMostGap) return false;
+    if (i < to && !(on_line(pan(), reports_[i]) && on_line(tilt(), reports_[i]))) return false;
+  }
+  return true;
+}
+
+bool HeadTrack::as_told(size_t from, size_t to) const {
+  const Report &a = reports_[from], &b = reports_[to];
+  const auto told = [&](const Axis& axis) {
+    const double off = b.*axis.angle - moved(axis, a.*axis.angle, a.time_ns, b.time_ns);
+    const double times =
+        3 * std::max(a.time_sigma, b.time_sigma) + kSpeedSigma * seconds(b.time_ns - a.time_ns);
+    return std::abs(off) <= axis.limits->count + times * fastest(axis, a.time_ns, b.time_ns);
+  };
+  return told(pan()) && told(tilt());
+}
+
+std::optional<HeadAngles> HeadTrack::confirmed_at(int64_t time_ns) const {
+  const auto after = std::lower_bound(reports_.begin(), reports_.end(), time_ns,
+                                      [](const Report& r, int64_t t) { return r.time_ns < t; });
+  const auto b = static_cast<size_t>(after - reports_.begin());
+  if (b == 0 || b == reports_.size()) return std::nullopt;
+  for (size_t from = b - std::min<size_t>(b, 4); from < b; ++from) {
+    if (straight(from, from + 4) || (from + 2 >= b && straight(from, from + 2) && as_told(from, from + 2)))
+      return at(time_ns);
+  }
+  return std::nullopt;
 }
 
 std::optional<int64_t> HeadTrack::last_report_ns() const {

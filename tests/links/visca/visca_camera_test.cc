@@ -154,48 +154,62 @@ TEST(ViscaCamera, NoticesThatSomebodyTurnedTheHead) {
   EXPECT_NEAR(said->pan, 50 * kDeg, kDeg / 8.8);
 }
 
-// Ten minutes at 9600 baud with every hundredth byte garbled, both ways, the head driven about all the while.
-TEST(ViscaCamera, SurvivesGarbageAndHardlyUsesAWrongPosition) {
-  TestRng rng;
-  ViscaRig rig(0.01);
-  rig.run(1);
-  int asked = 0, known = 0, wrong = 0, wrong_late = 0;
-  int64_t unknown_since = rig.now_ns(), longest_unknown = 0;
-  double worst = 0;
-  for (int i = 0; i < 600'000; ++i) {
-    if (i % 100 == 0) {
-      const auto head = rig.device().at(rig.now_ns());
-      rig.camera().point(
-          {Kind::kDrive, rng.normal(15 * kDeg) - 0.3 * head.pan, rng.normal(8 * kDeg) - 0.3 * head.tilt});
-    }
-    rig.step();
-    if (i % 33 != 0) continue;
-    const int64_t exposure = rig.now_ns() - 40'000'000;
-    const auto said = rig.camera().at(exposure);
-    ++asked;
-    if (rig.camera().expected_at(rig.now_ns())) unknown_since = rig.now_ns();
-    longest_unknown = std::max(longest_unknown, rig.now_ns() - unknown_since);
-    if (!said) continue;
-    ++known;
-    const auto truth = rig.device().at(exposure);
-    const double off = std::max(std::abs(said->pan - truth.pan), std::abs(said->tilt - truth.tilt));
-    const double sigmas = std::max(std::abs(said->pan - truth.pan) / said->pan_sigma,
-                                   std::abs(said->tilt - truth.tilt) / said->tilt_sigma);
-    worst = std::max(worst, off);
-    if (sigmas > 5 && off > 1 * kDeg) ++wrong;
-    if (sigmas > 5 && off > 3 * kDeg) ++wrong_late;
+// The device looks at what came once a field. After some questions each gets there just before.
+TEST(ViscaCamera, AsksJustBeforeTheDeviceLooks) {
+  ViscaRig rig;
+  rig.run(2);
+  EXPECT_LT(rig.camera().reaction(), 0.005);
+  // Commands between do not disturb that for long.
+  for (int i = 0; i < 20; ++i) {
+    rig.camera().point({Kind::kDrive, (i % 3 - 1) * 20 * kDeg, 0});
+    rig.run(0.1);
   }
-  const auto& s = rig.camera().statistics();
-  std::printf(
-      "asked %d known %d wrong %d (>3 deg %d) worst %.2f deg, longest unknown %.3f s; positions %lu doubted "
-      "%lu "
-      "refused %lu time-outs %lu starts %lu garbled %lu errors %lu\n",
-      asked, known, wrong, wrong_late, worst / kDeg, 1e-9 * static_cast<double>(longest_unknown), s.positions,
-      s.positions_doubted, s.positions_refused, s.time_outs, s.starts, s.garbled, s.errors);
-  // To be 0: one or two of 7000 slip through, where a garbled command and a garbled report agree.
-  EXPECT_LE(wrong, 3);
-  EXPECT_LT(longest_unknown, 1'000'000'000);
-  EXPECT_GT(known, asked / 3);
+  EXPECT_LT(rig.camera().reaction(), 0.006);
+}
+
+// Ten minutes each at 9600 baud with every hundredth byte garbled, both ways, the head driven about all the
+// while: no position that is wrong by more than five of its sigmas. (Of 200 such runs one has one, of a
+// count.)
+TEST(ViscaCamera, SurvivesGarbageAndUsesNoWrongPosition) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    TestRng rng(seed);
+    ViscaRig rig(0.01, false, seed);
+    rig.run(1);
+    int asked = 0, known = 0, wrong = 0;
+    int64_t unknown_since = rig.now_ns(), longest_unknown = 0;
+    double worst = 0, worst_sigmas = 0;
+    for (int i = 0; i < 600'000; ++i) {
+      if (i % 100 == 0) {
+        const auto head = rig.device().at(rig.now_ns());
+        rig.camera().point(
+            {Kind::kDrive, rng.normal(15 * kDeg) - 0.3 * head.pan, rng.normal(8 * kDeg) - 0.3 * head.tilt});
+      }
+      rig.step();
+      if (i % 33 != 0) continue;
+      const int64_t exposure = rig.now_ns() - 40'000'000;
+      const auto said = rig.camera().at(exposure);
+      ++asked;
+      if (rig.camera().expected_at(rig.now_ns())) unknown_since = rig.now_ns();
+      longest_unknown = std::max(longest_unknown, rig.now_ns() - unknown_since);
+      if (!said) continue;
+      ++known;
+      const auto truth = rig.device().at(exposure);
+      const double sigmas = std::max(std::abs(said->pan - truth.pan) / said->pan_sigma,
+                                     std::abs(said->tilt - truth.tilt) / said->tilt_sigma);
+      worst = std::max({worst, std::abs(said->pan - truth.pan), std::abs(said->tilt - truth.tilt)});
+      worst_sigmas = std::max(worst_sigmas, sigmas);
+      wrong += sigmas > 5;
+    }
+    const auto& s = rig.camera().statistics();
+    std::printf(
+        "asked %d known %d wrong %d, worst %.2f deg and %.1f sigma, longest unknown %.3f s; positions %lu "
+        "doubted %lu refused %lu time-outs %lu starts %lu garbled %lu errors %lu\n",
+        asked, known, wrong, worst / kDeg, worst_sigmas, 1e-9 * static_cast<double>(longest_unknown),
+        s.positions, s.positions_doubted, s.positions_refused, s.time_outs, s.starts, s.garbled, s.errors);
+    EXPECT_EQ(wrong, 0);
+    EXPECT_LT(longest_unknown, 1'000'000'000);
+    EXPECT_GT(known, asked / 5);
+  }
 }
 
 // Anything at all from the device, at any time.

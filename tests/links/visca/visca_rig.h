@@ -9,12 +9,12 @@ namespace perch {
 // A VISCA camera's two ends with a wire between them, ms by ms.
 class ViscaRig {
  public:
-  explicit ViscaRig(double flipped = 0, bool over_ip = false)
+  explicit ViscaRig(double flipped = 0, bool over_ip = false, uint64_t seed = 1)
       : camera_(options(over_ip)),
         device_(device_options(over_ip)),
         over_ip_(over_ip),
-        there_(over_ip ? 0 : 9600, flipped, 1),
-        back_(over_ip ? 0 : 9600, flipped, 2) {}
+        there_(over_ip ? 0 : 9600, flipped, 2 * seed - 1),
+        back_(over_ip ? 0 : 9600, flipped, 2 * seed) {}
 
   // `wire_cut`: nothing gets through.
   void step() {

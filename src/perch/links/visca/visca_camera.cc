@@ -17,16 +17,24 @@ constexpr int64_t kAnswerWithin = 100 * kMs;
 constexpr int64_t kAddressWithin = 300 * kMs;
 // Two thirds of the line stay for inquiries.
 constexpr int64_t kBetweenCommands = 60 * kMs;
+// On a line that garbles only the reports between two commands can be trusted: there are to be some.
+constexpr int64_t kBetweenCommandsGarbled = 240 * kMs;
 // A drive that goes on is said again now and then: a byte on the way may have made another of it.
 constexpr int64_t kSayAgain = 500 * kMs;
 // Somebody may zoom: so long a picture may be taken for one of another lens.
 constexpr int64_t kBetweenZooms = 400 * kMs;
+// So long before the device looks a question is to be there: what the clocks of this machine waver by.
+constexpr double kJustBefore = 0.003;  // s
+// Longer than a field of video (PAL: 20 ms) no pause is of use; nor is one to a device that looks at any
+// time.
+constexpr double kLongestPause = 0.021;  // s
+constexpr int64_t kUselessFor = 10'000 * kMs;
 constexpr int64_t kBufferFullPause = 50 * kMs;
 // The longest way at the lowest speed that is asked for, and a completion that was lost.
 constexpr int64_t kSocketFor = 5000 * kMs;
 // The bytes of a packet follow each other.
 constexpr int64_t kSilence = 50 * kMs;
-constexpr int kMostFailures = 3;
+constexpr int kMostFailures = 5;
 constexpr int kMostTries = 3;
 // Two readings of the zoom that agree to a hundredth.
 constexpr double kZoomAgrees = 0.01;
@@ -71,9 +79,7 @@ void ViscaCamera::start(State state) {
 }
 
 std::optional<HeadAngles> ViscaCamera::at(int64_t time_ns) const {
-  const bool beyond = !track_.last_report_ns() || time_ns > *track_.last_report_ns();
-  if (beyond && last_byte_ns_ < garbles_until_ns_) return std::nullopt;
-  return track_.at(time_ns);
+  return garbles() ? track_.confirmed_at(time_ns) : track_.at(time_ns);
 }
 
 void ViscaCamera::point(const HeadGoal& goal) {
@@ -84,7 +90,7 @@ void ViscaCamera::point(const HeadGoal& goal) {
 }
 
 void ViscaCamera::zoom_to(double zoom) {
-  if (std::isfinite(zoom)) zoom_goal_ = std::clamp(zoom, 0.0, 1.0);
+  if (std::isfinite(zoom)) zoom_told_ = zoom_goal_ = std::clamp(zoom, 0.0, 1.0);
 }
 
 DriveSteps ViscaCamera::steps_of(const HeadGoal& goal) const {
@@ -165,8 +171,24 @@ void ViscaCamera::handle_answer(const Reply& reply, int64_t arrival_ns) {
   if (clear) state_ = State::kReady;
   if (pan_tilt) take_position(reply.payload, arrival_ns);
   if (zoom) take_zoom(reply.payload);
+  answered(arrival_ns);
+}
+
+void ViscaCamera::answered(int64_t arrival_ns) {
+  answered_ = waiting_->what;
+  answered_ns_ = arrival_ns;
   waiting_.reset();
   failures_ = restarts_ = 0;
+}
+
+// A question that came too late waits for the next look: it took longer by a field.
+void ViscaCamera::learn_pause(double took, int64_t arrival_ns) {
+  Pause& pause = pauses_[static_cast<size_t>(answered_)];
+  const bool missed = pause.length > 0 && took > pause.took + 2 * kJustBefore;
+  pause.took = took;
+  if (arrival_ns < pause.useless_until_ns) return;
+  pause.length = std::max(0.0, pause.length + (missed ? -kJustBefore : took - kJustBefore) / 2);
+  if (pause.length > kLongestPause) pause = {0, took, arrival_ns + kUselessFor};
 }
 
 // The device looked at its angles at some moment after the question was there and before the answer left.
@@ -178,6 +200,7 @@ void ViscaCamera::take_position(std::span<const uint8_t> payload, int64_t arriva
   const int64_t to_ns = std::max(from_ns, arrival_ns - nanoseconds(answer));
   const double took = seconds(to_ns - from_ns);
   reaction_ += reaction_ == 0 ? took : (took - reaction_) / 16;
+  learn_pause(took, arrival_ns);
   const auto verdict =
       track_.add(from_ns + (to_ns - from_ns) / 2, took / std::sqrt(12.0),
                  counts.pan * options_.head.pan.count, counts.tilt * options_.head.tilt.count);
@@ -192,6 +215,9 @@ void ViscaCamera::take_zoom(std::span<const uint8_t> payload) {
   const bool agrees = zoom_suspect_ && std::abs(*zoom_suspect_ - zoom) < kZoomAgrees;
   zoom_suspect_ = zoom;
   if (agrees) zoom_ = zoom;
+  // It stands elsewhere than it was told to: its command was lost, or cancelled for another's sake.
+  if (agrees && zoom_told_ && !zoom_goal_ && std::abs(*zoom_told_ - zoom) >= kZoomAgrees)
+    zoom_goal_ = zoom_told_;
   // Somebody zooms, or the line garbled: nobody knows until two agree again.
   if (zoom_ && std::abs(*zoom_ - zoom) >= kZoomAgrees) zoom_.reset();
 }
@@ -216,8 +242,7 @@ void ViscaCamera::handle_ack(const Reply& reply, int64_t arrival_ns) {
     }
     track_.moves(begun_ns + nanoseconds(options_.motor_delay), goal);
   }
-  waiting_.reset();
-  failures_ = restarts_ = 0;
+  answered(arrival_ns);
 }
 
 void ViscaCamera::handle_error(const Reply& reply) {
@@ -251,7 +276,10 @@ void ViscaCamera::again(const Waiting& waiting) {
 void ViscaCamera::failed() {
   const Waiting waiting = *waiting_;
   waiting_.reset();
-  if (waiting.what == Ask::kMove) driving_.reset();  // taken or not: nobody knows
+  if (waiting.what == Ask::kMove) {  // taken or not: nobody knows
+    driving_.reset();
+    track_.may_move(waiting.sent_ns, last_tick_ns_ + nanoseconds(options_.motor_delay));
+  }
   again(waiting);
   if (++failures_ < kMostFailures) return;
   // First what the device holds may be in disorder, then who it thinks it is.
@@ -268,19 +296,26 @@ int ViscaCamera::free_socket() const {
 std::optional<ViscaCamera::Waiting> ViscaCamera::next(int64_t now_ns) {
   if (state_ == State::kAddress) return Waiting{Ask::kAddress};
   if (state_ == State::kClear) return Waiting{Ask::kClear};
-  const bool may_command = now_ns >= hold_until_ns_ && now_ns - last_command_ns_ >= kBetweenCommands;
+  // What does not move as it was told is told again at once.
+  const int64_t between = garbles() && driving_ ? kBetweenCommandsGarbled : kBetweenCommands;
+  const bool may_command = now_ns >= hold_until_ns_ && now_ns - last_command_ns_ >= between;
   if (may_command && (goal_ || zoom_goal_)) {
     last_command_ns_ = now_ns;
     if (!free_socket()) return Waiting{Ask::kCancel};
-    Waiting waiting{goal_ ? Ask::kMove : Ask::kZoomMove};
-    if (goal_) {
-      waiting.goal = *std::exchange(goal_, std::nullopt);
-    } else {
+    // The zoom is told seldom, a movement with each picture.
+    Waiting waiting{zoom_goal_ ? Ask::kZoomMove : Ask::kMove};
+    if (zoom_goal_) {
       waiting.zoom = *std::exchange(zoom_goal_, std::nullopt);
+      zoom_.reset();  // until it is found standing still
+      zoom_suspect_.reset();
+    } else {
+      waiting.goal = *std::exchange(goal_, std::nullopt);
     }
     ++statistics_.commands;
     return waiting;
   }
+  if (now_ns - answered_ns_ < nanoseconds(pauses_[static_cast<size_t>(answered_)].length))
+    return std::nullopt;
   ++statistics_.inquiries;
   if (now_ns - last_zoom_ns_ > (zoom_ ? kBetweenZooms : kBetweenZooms / 4)) {
     last_zoom_ns_ = now_ns;
@@ -325,6 +360,7 @@ Bytes ViscaCamera::packet_of(const Waiting& waiting) const {
 }
 
 std::vector<Bytes> ViscaCamera::tick(int64_t now_ns) {
+  last_tick_ns_ = now_ns;
   for (Socket& socket : sockets_) {
     if (socket.busy && now_ns - socket.since_ns > kSocketFor) socket = {};
   }
@@ -332,6 +368,7 @@ std::vector<Bytes> ViscaCamera::tick(int64_t now_ns) {
     const int64_t within = waiting_->what == Ask::kAddress ? kAddressWithin : kAnswerWithin;
     if (now_ns - waiting_->sent_ns <= within) return {};
     ++statistics_.time_outs;
+    line_garbles();
     parser_.drop();
     failed();
   }

@@ -40,8 +40,10 @@ struct ViscaStatistics {
 //      ^------------------------ z0 38 (network change), at any time ----------------------------'
 //
 // One packet at a time waits for its answer, as answers do not say what they answer: a command for its ACK,
-// an inquiry for its reply. In between positions are asked for without a pause. A goal that has not left yet
-// gives way to a newer one; one that was not acknowledged is sent again.
+// an inquiry for its reply. In between positions are asked for again and again, each question so that it gets
+// there just before the device looks at what came, which it does once a field of video: of the moment that
+// the answer is about the less is unknown. A goal that has not left yet gives way to a newer one; one that
+// was not acknowledged is sent again.
 class ViscaCamera : public PtzCamera {
  public:
   explicit ViscaCamera(const ViscaOptions& options);
@@ -52,8 +54,7 @@ class ViscaCamera : public PtzCamera {
 
   void point(const HeadGoal& goal) override;
   void zoom_to(double zoom) override;
-  // On a line that garbles, a command may have been taken for another, and only the report after it tells:
-  // what lies beyond the last report is not known then.
+  // On a line that garbled within the last 10 s, only what HeadTrack::confirmed_at says.
   std::optional<HeadAngles> at(int64_t time_ns) const override;
   std::optional<HeadAngles> expected_at(int64_t time_ns) const override { return track_.at(time_ns); }
   std::optional<double> zoom() const override { return zoom_; }
@@ -70,6 +71,7 @@ class ViscaCamera : public PtzCamera {
  private:
   enum class State { kAddress, kClear, kReady };
   enum class Ask { kAddress, kClear, kPanTilt, kZoom, kMove, kZoomMove, kCancel };
+  static constexpr size_t kAsks = 7;
   struct Waiting {
     Ask what = Ask::kAddress;
     int64_t sent_ns = 0;
@@ -77,6 +79,11 @@ class ViscaCamera : public PtzCamera {
     uint32_t sequence = 0;
     HeadGoal goal{};
     double zoom = 0;
+  };
+  // How long to wait with a question after an answer, and what its own answer then took.
+  struct Pause {
+    double length = 0, took = 0;  // s
+    int64_t useless_until_ns = 0;
   };
   // A command in the device, until it says that it is done.
   struct Socket {
@@ -92,8 +99,11 @@ class ViscaCamera : public PtzCamera {
   void handle_error(const Reply& reply);
   void take_position(std::span<const uint8_t> payload, int64_t arrival_ns);
   void take_zoom(std::span<const uint8_t> payload);
+  void answered(int64_t arrival_ns);
+  void learn_pause(double took, int64_t arrival_ns);
   void failed();
   void line_garbles() { garbles_until_ns_ = last_byte_ns_ + kGarblesFor; }
+  bool garbles() const { return last_byte_ns_ < garbles_until_ns_; }
   void again(const Waiting& waiting);
 
   std::optional<Waiting> next(int64_t now_ns);
@@ -110,14 +120,17 @@ class ViscaCamera : public PtzCamera {
   ViscaStatistics statistics_;
 
   std::optional<Waiting> waiting_;
+  std::array<Pause, kAsks> pauses_{};  // by what was answered before
+  Ask answered_ = Ask::kAddress;
+  int64_t answered_ns_ = 0;
   std::array<Socket, 3> sockets_{};  // from 1
   std::optional<HeadGoal> goal_;     // to be sent
-  std::optional<double> zoom_goal_;
+  std::optional<double> zoom_goal_, zoom_told_;
   std::optional<DriveSteps> driving_;  // what the device acknowledged last
   static constexpr int64_t kGarblesFor = 10'000'000'000;
   int64_t garbles_until_ns_ = 0;
   int64_t driving_since_ns_ = 0, hold_until_ns_ = 0, last_command_ns_ = 0, last_zoom_ns_ = 0,
-          last_byte_ns_ = 0;
+          last_byte_ns_ = 0, last_tick_ns_ = 0;
   int failures_ = 0, restarts_ = 0, goal_tries_ = 0;
   uint32_t sequence_ = 0;
   bool reset_sequence_ = true;
