@@ -53,6 +53,10 @@ LiveConfig read_live_config(Section root) {
   if (config.ptz && !config.run.frames.pan_tilt) {
     root.section("frames").fail("base_from_camera", "pan_tilt: {...}, as ptz.device turns the camera");
   }
+  if (config.ptz && config.ptz->gimbal && config.nav != NavSource::kMavlink)
+    root.section("ptz").fail("device", "mavlink with nav: mavlink+URL, the autopilot whose gimbal it is");
+  if (config.ptz && config.ptz->fill && !config.run.zoom_table)
+    root.section("ptz").fail("fill", "camera.zoom_table with it, the lens at each zoom");
   Section outputs = root.section("outputs");
   config.mavlink = mavlink::read_mavlink_options(outputs);
   config.mavlink.link.gimbal = config.run.frames.pan_tilt.has_value();

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "live_ptz.h"
+#include "live_head.h"
 #include "perch/config/section.h"
 #include "perch/estimator/run_config.h"
 #include "perch/links/mavlink/mavlink_options.h"

@@ -46,7 +46,8 @@ const char* name_of(LinkState state) {
 
 }  // namespace
 
-LiveLink::LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap)
+LiveLink::LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap, const FrameChain& frames,
+                   const CameraModel& camera)
     : latency_(latency),
       tap_(std::move(tap)),
       sends_(config.mavlink.send),
@@ -59,10 +60,22 @@ LiveLink::LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap)
       link_(config.mavlink.link, signing_.get()),
       output_(config.mavlink.landing),
       feed_(config.run.frames.time_offset),
-      watch_(config.run.tracking.coast),
-      thread_([this] { run(); }) {}
+      watch_(config.run.tracking.coast) {
+  if (config.ptz && config.ptz->gimbal) {
+    steering_.emplace(*config.ptz, config.run, frames, camera, mavlink::GimbalOptions{}.head);
+    link_.listen([this](const mavlink::Frame& frame) { hear_for_gimbal(frame); });
+  }
+  thread_ = std::thread([this] { run(); });
+}
 
 LiveLink::~LiveLink() {
+  if (steering_) {  // or it would turn on
+    {
+      const std::lock_guard lock(mutex_);
+      if (gimbal_) gimbal_->point({});
+    }
+    std::this_thread::sleep_for(100ms);
+  }
   stop_ = true;
   stream_.wake();
   thread_.join();
@@ -92,6 +105,7 @@ void LiveLink::hear() {
     tell(report);
   }
   tell_state(now_ns);
+  tell_gimbal(now_ns);
   notice_changes();
   record_navigation();
 }
@@ -126,6 +140,43 @@ void LiveLink::tell_state(int64_t now_ns) {
     ++states_told_;
     send(link_.frame_of(*text), now_ns);
   }
+}
+
+void LiveLink::tell_gimbal(int64_t now_ns) {
+  if (!steering_ || link_.state() != LinkState::kUp) return;
+  if (!gimbal_) {
+    mavlink::GimbalOptions options;
+    options.system = options.our_system = link_.autopilot().system;
+    options.our_component = link_.component();
+    gimbal_.emplace(options, link_.history());
+  }
+  const auto out = gimbal_->tick(now_ns);
+  if (out.command) send(link_.frame_of(*out.command), now_ns);
+  if (out.set) send(link_.frame_of(*out.set), now_ns);
+}
+
+void LiveLink::hear_for_gimbal(const mavlink::Frame& frame) {
+  if (!gimbal_) return;
+  if (const auto ack = mavlink::decode<mavlink::CommandAck>(frame)) gimbal_->receive(*ack);
+  if (const auto status = mavlink::decode<mavlink::GimbalManagerStatus>(frame)) gimbal_->receive(*status);
+}
+
+void LiveLink::steer_gimbal(const std::optional<VehicleState>& state,
+                            const std::optional<Eigen::Quaterniond>& world_from_body,
+                            const std::optional<HeadControl::Glimpse>& glimpse) {
+  const std::lock_guard lock(mutex_);
+  if (gimbal_) steering_->steer(monotonic_ns(), state, world_from_body, glimpse, *gimbal_);
+}
+
+bool LiveLink::centre_gimbal() {
+  const std::lock_guard lock(mutex_);
+  if (gimbal_) steering_->centre(monotonic_ns(), *gimbal_);
+  return gimbal_.has_value();
+}
+
+nlohmann::json LiveLink::gimbal_status() const {
+  const std::lock_guard lock(mutex_);
+  return gimbal_ ? steering_->status(monotonic_ns(), *gimbal_) : nlohmann::json();
 }
 
 void LiveLink::notice_changes() {
@@ -231,6 +282,10 @@ nlohmann::ordered_json LiveLink::summary() const {
   for (size_t i = 1; i < mavlink::kLandingRefusals; ++i) {
     const auto refusal = static_cast<mavlink::LandingRefusal>(i);
     json["refused"][std::string(name_of(refusal))] = output_.count(refusal);
+  }
+  if (steering_) {
+    json["gimbal"] = {{"controlled", gimbal_ && gimbal_->ready()}};
+    json["gimbal"].update(steering_->summary());
   }
   json["reports_dropped"] = reports_dropped_;
   json["states_told"] = states_told_;

@@ -14,12 +14,14 @@
 #include <vector>
 
 #include "live_config.h"
+#include "live_head.h"
 #include "live_latency.h"
 #include "perch/estimator/estimator.h"
 #include "perch/flight/nav_track.h"
 #include "perch/links/byte_stream.h"
 #include "perch/links/mavlink/autopilot_feed.h"
 #include "perch/links/mavlink/doctor.h"
+#include "perch/links/mavlink/gimbal_camera.h"
 #include "perch/links/mavlink/landing_output.h"
 #include "perch/links/mavlink/pad_watch.h"
 #include "perch/links/mavlink/vehicle_link.h"
@@ -43,14 +45,22 @@ struct LinkTap {
 // The autopilot: a thread that hears it and tells it, and the two questions the estimator has for it.
 class LiveLink {
  public:
-  // `latency` must outlive the link.
-  LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap);
+  // `latency` must outlive the link. `frames` and `camera`: for a gimbal, as of LiveHead.
+  LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap, const FrameChain& frames,
+           const CameraModel& camera);
   ~LiveLink();  // ends the thread
 
   // What is known beside the picture at this frame's time, and what was said since the last one's.
   Estimator::Aid aid_at(int64_t camera_time_ns);
   // Never waits: what the link does not get rid of is dropped, the oldest first, and counted.
   void report(const PadReport& report);
+
+  // With `ptz.device: mavlink`: the vehicle's gimbal, which is told what to do by and by.
+  void steer_gimbal(const std::optional<VehicleState>& state,
+                    const std::optional<Eigen::Quaterniond>& world_from_body,
+                    const std::optional<HeadControl::Glimpse>& glimpse);
+  bool centre_gimbal();                  // false without one
+  nlohmann::json gimbal_status() const;  // null without one
 
   // What happened since the last call, for the log and the recording: the autopilot's texts, the link's
   // state.
@@ -73,6 +83,8 @@ class LiveLink {
   void hear();
   void tell(const PadReport& report);
   void tell_state(int64_t now_ns);
+  void tell_gimbal(int64_t now_ns);
+  void hear_for_gimbal(const mavlink::Frame& frame);
   void notice_changes();
   void record_navigation();
   void send(const std::vector<uint8_t>& bytes, int64_t now_ns);
@@ -91,6 +103,8 @@ class LiveLink {
   mavlink::AutopilotFeed feed_;
   mavlink::PadWatch watch_;
   mavlink::StateTexts texts_;
+  std::optional<LiveHead> steering_;             // of the gimbal
+  std::optional<mavlink::GimbalCamera> gimbal_;  // once the vehicle is known
   std::deque<PadReport> reports_;
   uint64_t reports_dropped_ = 0, states_told_ = 0;
   std::vector<std::string> events_;

@@ -52,12 +52,14 @@ LiveRun::LiveRun(const LiveConfig& config, OpenedSource source, LinkTap tap, OnE
       slot_(when_full(config, source_)),
       watch_(config.run.tracking.coast) {
   if (config.nav == NavSource::kMavlink) {
-    link_ = std::make_unique<LiveLink>(config, latency_, std::move(tap));
+    link_ = std::make_unique<LiveLink>(config, latency_, std::move(tap),
+                                       with_mount_of(config, source_).frames, source_.camera);
   } else if (config.nav == NavSource::kFlight && source_.flight) {
     aids_ = std::make_unique<FlightAids>(*source_.flight, with_mount_of(config, source_).frames, config.run);
   }
-  if (config.ptz) {
-    ptz_ = std::make_unique<LivePtz>(*config.ptz, with_mount_of(config, source_).frames, source_.camera);
+  if (config.ptz && !config.ptz->gimbal) {
+    ptz_ = std::make_unique<LivePtz>(*config.ptz, config.run, with_mount_of(config, source_).frames,
+                                     source_.camera);
   }
   estimator_thread_ = std::thread([this] { guard([this] { estimate(); }); });
   capture_thread_ = std::thread([this] { guard([this] { capture(); }); });
@@ -125,10 +127,21 @@ void LiveRun::estimate() {
     latency_.add(LiveStage::kWaiting, taken_ns - picture.arrived_ns);
     latency_.add(LiveStage::kEstimate, monotonic_ns() - taken_ns);
     hand_on(picture, estimate);
-    if (ptz_) ptz_->report(estimate.state, aid.world_from_body);
+    steer(estimate, aid);
     if (on_estimate_) on_estimate_(picture.frame, aid, estimate);
   }
   finished_ = true;
+}
+
+void LiveRun::steer(const Estimate& estimate, const Estimator::Aid& aid) {
+  std::optional<HeadControl::Glimpse> glimpse;
+  if (estimate.status == EstimateStatus::kOk)
+    glimpse = {estimate.timestamp_ns, estimate.camera_from_target.mean.translation};
+  if (ptz_) {
+    ptz_->steer(estimate.state, aid.world_from_body, glimpse);
+  } else if (link_) {
+    link_->steer_gimbal(estimate.state, aid.world_from_body, glimpse);
+  }
 }
 
 Estimator::Aid LiveRun::aid_at(int64_t camera_time_ns) {
@@ -170,6 +183,20 @@ uint64_t LiveRun::progress() const {
 mavlink::PadState LiveRun::pad_state() const {
   const std::lock_guard lock(mutex_);
   return watch_.at(monotonic_ns());
+}
+
+nlohmann::json LiveRun::head_status() const {
+  if (ptz_) return ptz_->status();
+  return link_ ? link_->gimbal_status() : nlohmann::json();
+}
+
+std::string LiveRun::centre_head() {
+  if (ptz_) {
+    ptz_->centre();
+  } else if (!link_ || !link_->centre_gimbal()) {
+    return "centre: no pan/tilt head is driven";
+  }
+  return "centre: the head goes to its middle";
 }
 
 std::optional<VehicleState> LiveRun::last_state() const {

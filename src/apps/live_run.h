@@ -44,6 +44,9 @@ class LiveRun {
   // Counts on while all threads go on.
   uint64_t progress() const;
   mavlink::PadState pad_state() const;
+  // Null without a head that is moved. What was done, in a sentence.
+  nlohmann::json head_status() const;
+  std::string centre_head();
   LiveLink* link() { return link_.get(); }  // null without an autopilot
   // Of the last frame; empty before the first pose.
   std::optional<VehicleState> last_state() const;
@@ -55,6 +58,7 @@ class LiveRun {
  private:
   void capture();
   void estimate();
+  void steer(const Estimate& estimate, const Estimator::Aid& aid);
   Estimator::Aid aid_at(int64_t camera_time_ns);
   void hand_on(const LiveFrame& picture, const Estimate& estimate);
   void guard(const std::function<void()>& work);

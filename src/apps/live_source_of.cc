@@ -15,7 +15,7 @@ std::string rest_of(const std::string& source) { return source.substr(source.fin
 // The lens at the zoom that the run is at; of a replay only its size counts, as each frame has its own.
 CameraModel zoomed_camera(const LiveConfig& config) {
   const ZoomTable& table = *config.run.zoom_table;
-  if (config.ptz) {
+  if (config.ptz && !config.ptz->gimbal) {
     const auto camera = table.at(config.ptz->zoom);
     if (camera) return *camera;
     throw ConfigError("ptz.zoom: expected one that camera.zoom_table was calibrated for, found " +
@@ -23,7 +23,7 @@ CameraModel zoomed_camera(const LiveConfig& config) {
   }
   if (config.nav != NavSource::kFlight) {
     throw ConfigError(
-        "camera.zoom_table: expected ptz.device or camera.model, as nothing else tells the zoom");
+        "camera.zoom_table: expected ptz.device: visca... or camera.model, as nothing else tells the zoom");
   }
   return table.entries().front().model;
 }

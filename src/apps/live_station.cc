@@ -86,6 +86,7 @@ nlohmann::json LiveStation::status_of(LiveRun& run, LiveRecording& recording) co
        {{"dropped", camera.dropped}, {"reopened", camera.reopened}, {"problem", camera.last_problem}}},
       {"recording", recording.status()},
       {"watching", station_.counts().watching},
+      {"head", run.head_status()},
       {"link", nullptr}};
   if (run.link()) status["link"] = link_json(*run.link());
   return status;
@@ -105,7 +106,7 @@ std::vector<std::string> LiveStation::look_after(LiveRun& run, LiveRecording& re
         events.push_back("mark: " + mavlink::printable(command.text));
         break;
       case StationCommand::Kind::kCentreHead:
-        events.emplace_back("centre: no pan/tilt head is driven");
+        events.push_back(run.centre_head());
         break;
     }
   }

@@ -16,15 +16,16 @@ class HeadFeed {
  public:
   explicit HeadFeed(const std::string& url) : stream_(parse_stream_url(url)) {}
 
-  // At a time up to half a second back, after taking in what has come; empty when nothing was told within 20
-  // ms.
-  std::optional<HeadAngles> at(int64_t time_ns);
-
- private:
   struct Told {
     int64_t time_ns;
     HeadAngles angles;
+    double zoom;  // 0 widest, 1 narrowest
   };
+  // At a time up to half a second back, after taking in what has come; empty when nothing was told within 20
+  // ms.
+  std::optional<Told> at(int64_t time_ns);
+
+ private:
   void take_in();
   void take(const Chunk& chunk);
 

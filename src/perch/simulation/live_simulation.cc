@@ -70,11 +70,24 @@ void LiveSimulation::render() {
   picture_.emplace();
   picture_->timestamp_ns = stamp_ns(frame_);
   picture_->name = std::to_string(frame_);
-  HeadAngles angles;
-  if (head_) angles = head_->at(stamp_ns(frame_)).value_or(angles);
-  picture_->grey = flight_.picture(frame_, angles);
+  const auto head = head_ ? head_->at(stamp_ns(frame_)) : std::nullopt;
+  picture_->grey = head ? flight_at(head->zoom).picture(frame_, head->angles) : flight_.picture(frame_);
   const auto cost = static_cast<double>(clock_.now_ns() - start);
   cost_ns_ += cost_ns_ == 0 ? cost : (cost - cost_ns_) / 8;
+}
+
+const SimulatedFlight& LiveSimulation::flight_at(double zoom) {
+  if (zoom == 0 || flight_.simulation().zoom_ratio == 1) return flight_;
+  if (!zoomed_ || zoom != zoom_) {
+    Simulation simulation = flight_.simulation();
+    std::vector<double> intrinsics = simulation.camera.intrinsics();  // the focal lengths first
+    for (size_t i = 0; i < 2; ++i) intrinsics[i] *= std::pow(simulation.zoom_ratio, zoom);
+    simulation.camera = {simulation.camera.lens(), intrinsics, simulation.camera.width(),
+                         simulation.camera.height()};
+    zoomed_ = std::make_unique<SimulatedFlight>(simulation);
+    zoom_ = zoom;
+  }
+  return *zoomed_;
 }
 
 Eigen::Vector3d LiveSimulation::angular_velocity_in_body(int64_t time_ns) const {

@@ -54,6 +54,7 @@ class LiveSimulation : public LiveSource {
   double seconds(int64_t time_ns) const { return static_cast<double>(time_ns - stamp_ns(0)) * 1e-9; }
   int64_t due_ns(int64_t frame) const { return stamp_ns(frame) + exposed_ns_; }
   void render();
+  const SimulatedFlight& flight_at(double zoom);
 
   SimulatedFlight flight_;
   Pace pace_;
@@ -64,8 +65,10 @@ class LiveSimulation : public LiveSource {
   std::vector<NavigationError> errors_;  // in the order of their times
   int64_t frame_ = 0;                    // the next one
   std::unique_ptr<HeadFeed> head_;       // where the camera turns
-  std::optional<Frame> picture_;         // of frame_, once it is rendered
-  double cost_ns_ = 0;                   // of rendering a picture, smoothed
+  double zoom_ = 0;
+  std::unique_ptr<SimulatedFlight> zoomed_;  // the same through the lens at zoom_, but for the widest
+  std::optional<Frame> picture_;             // of frame_, once it is rendered
+  double cost_ns_ = 0;                       // of rendering a picture, smoothed
   std::atomic<bool> ended_ = false;
 };
 

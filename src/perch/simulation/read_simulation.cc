@@ -41,6 +41,7 @@ void read_camera(Section camera, Simulation& simulation) {
   camera.read("rate_hz", simulation.rate_hz, Range{0.1, 1000});
   camera.read("body_from_camera", simulation.body_from_camera);
   if (camera.has("head")) camera.read("head", simulation.head);
+  camera.read("zoom_ratio", simulation.zoom_ratio, Range{1, 100});
   // PointSpread reaches 31 px.
   camera.read("psf_sigma_px", simulation.picture.optics.psf_sigma_px, Range{0, 7});
   camera.read("vignetting", simulation.picture.optics.vignetting, kFraction);

@@ -28,6 +28,8 @@ struct Simulation {
   // body_from_camera is then that at zero angles. For pictures as they happen alone: a head answers to what
   // is seen.
   std::string head;
+  // Its focal length at the narrow end over that at the wide one, which `camera` has; in between a power.
+  double zoom_ratio = 1;
   // Level, face up: the pad's z is -z of NED.
   Rigid3 world_from_pad;
   // A pad on a ship moves about that place; the flight goes to it, too, and does not follow the deck.

@@ -48,6 +48,8 @@ class FakeAutopilot {
   std::map<std::string, double> parameters = {{"PLND_ENABLED", 1}, {"PLND_TYPE", 1}, {"PLND_LAG", 0.0625}};
   std::set<uint32_t> unsupported;
   std::function<TrueMotion(int64_t)> motion = [](int64_t) { return TrueMotion{}; };
+  std::function<GimbalDeviceAttitudeStatus(int64_t)> gimbal;  // where it looks; without: there is none
+  std::function<void(const Frame&, int64_t)> on_frame;        // hears what it hears
 
   // ---- What the test looks at.
   std::map<uint32_t, int> heard;      // messages of ours, by id
@@ -162,11 +164,16 @@ class FakeAutopilot {
       sensor.current_distance = static_cast<uint16_t>(std::max(0.0f, -100 * p.z()));
       sensor.orientation = kOrientationDown;
       send(sensor, now_ns);
+    } else if (id == GimbalDeviceAttitudeStatus::kId && gimbal) {
+      GimbalDeviceAttitudeStatus status = gimbal(now_ns);
+      status.time_boot_ms = boot_ms;
+      send(status, now_ns);
     }
   }
 
   void handle(const Frame& frame, int64_t now_ns) {
     ++heard[frame.id()];
+    if (on_frame) on_frame(frame, now_ns);
     speakers.insert({frame.system, frame.component});
     if (const auto m = decode<LandingTarget>(frame)) landing_targets.push_back(*m);
     if (const auto m = decode<Statustext>(frame)) texts.push_back(*m);

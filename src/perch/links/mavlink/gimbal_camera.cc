@@ -26,7 +26,10 @@ GimbalCamera::GimbalCamera(const GimbalOptions& options, const VehicleHistory& h
     : options_(options), history_(history) {}
 
 void GimbalCamera::receive(const CommandAck& ack) {
-  if (ack.command == mav_command::kGimbalManagerConfigure) control_ = ack.result == mav_result::kAccepted;
+  const bool to_us = (ack.target_system == 0 || ack.target_system == options_.our_system) &&
+                     (ack.target_component == 0 || ack.target_component == options_.our_component);
+  if (to_us && ack.command == mav_command::kGimbalManagerConfigure)
+    control_ = ack.result == mav_result::kAccepted;
 }
 
 void GimbalCamera::receive(const GimbalManagerStatus& status) {

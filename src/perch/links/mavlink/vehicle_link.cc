@@ -91,6 +91,7 @@ void VehicleLink::handle(const Frame& frame, int64_t arrival_ns) {
     ++statistics_.foreign;
     return;
   }
+  if (on_frame_) on_frame_(frame);
   if (frame.id() == GimbalDeviceAttitudeStatus::kId) return handle_gimbal(frame, arrival_ns);
   // A rangefinder or a relay may have a component of its own; all else is the autopilot's to say.
   if (frame.component != mav_component::kAutopilot && frame.id() != DistanceSensor::kId) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -81,6 +82,8 @@ class VehicleLink {
   void receive(std::span<const uint8_t> bytes, int64_t arrival_ns, bool datagram);
   // The bytes to send now.
   std::vector<uint8_t> tick(int64_t now_ns);
+  // Hears every frame of the vehicle, of each of its components, beside the link.
+  void listen(std::function<void(const Frame&)> on_frame) { on_frame_ = std::move(on_frame); }
   // The bytes of one message of ours.
   template <class Message>
   std::vector<uint8_t> frame_of(const Message& message) {
@@ -90,6 +93,7 @@ class VehicleLink {
   }
 
   LinkState state() const { return state_; }
+  uint8_t component() const { return options_.component; }  // ours
   // Meaningful from the first time the link was up.
   const Autopilot& autopilot() const { return autopilot_; }
   const VehicleHistory& history() const { return history_; }
@@ -128,6 +132,7 @@ class VehicleLink {
   }
 
   VehicleLinkOptions options_;
+  std::function<void(const Frame&)> on_frame_;
   FrameParser parser_;
   FrameWriter writer_;
   std::vector<uint8_t> out_;
