@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <functional>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "perch/geometry/euler.h"
 #include "perch/geometry/rigid3.h"
 #include "perch/links/mavlink/frame.h"
 #include "perch/links/mavlink/messages.h"
@@ -43,8 +45,13 @@ class FakeAutopilot {
   double delay_ms = 2, jitter_ms = 2;  // exponential, of each message on its own; their order is kept
   double loss = 0;                     // both ways
   bool silent = false;
-  bool datagrams = true;  // else what it hears is a stream, cut anywhere
-  int deaf_requests = 0;  // so many intervals asked for are ignored
+  bool datagrams = true;          // else what it hears is a stream, cut anywhere
+  bool only_answers = false;      // nothing by itself, no heartbeat either, and no streams
+  bool stamps = true;             // else every time_boot_ms is 0
+  std::set<uint32_t> unanswered;  // questions for these are not heard
+  double late = 0;                // this share of the messages, and all behind them, wait for 0.4 s
+  double twice = 0;               // this share comes twice, the second time up to 0.2 s later
+  int deaf_requests = 0;          // so many intervals asked for are ignored
   std::map<std::string, double> parameters = {{"PLND_ENABLED", 1}, {"PLND_TYPE", 1}, {"PLND_LAG", 0.0625}};
   std::set<uint32_t> unsupported;
   std::function<TrueMotion(int64_t)> motion = [](int64_t) { return TrueMotion{}; };
@@ -53,6 +60,7 @@ class FakeAutopilot {
 
   // ---- What the test looks at.
   std::map<uint32_t, int> heard;      // messages of ours, by id
+  std::map<uint32_t, int> requests;   // of single messages
   std::map<uint32_t, int> intervals;  // requests for each message's interval
   std::vector<LandingTarget> landing_targets;
   std::vector<Statustext> texts;
@@ -81,7 +89,7 @@ class FakeAutopilot {
       datagrams ? parser_.parse_datagram(bytes, hear) : parser_.parse(bytes, hear);
       incoming_.pop_front();
     }
-    if (!silent) {
+    if (!silent && !only_answers) {
       if (due(Heartbeat::kId, 1, now_ns)) send_heartbeat(now_ns);
       for (const auto& [id, hz] : streams_) {
         if (due(id, hz, now_ns)) send_stream(id, now_ns);
@@ -99,8 +107,16 @@ class FakeAutopilot {
     writer_.append(bytes, message);
     if (rng.uniform(0, 1) < loss) return;
     int64_t due = now_ns + delay();
+    if (late > 0 && rng.uniform(0, 1) < late) due += 400 * kMs;
     if (!outgoing_.empty()) due = std::max(due, outgoing_.back().due_ns);
     outgoing_.push_back({due, bytes});
+    if (twice > 0 && rng.uniform(0, 1) < twice) {
+      const Packet again{due + static_cast<int64_t>(rng.uniform(0, 200e6)), bytes};
+      const auto place =
+          std::upper_bound(outgoing_.begin(), outgoing_.end(), again,
+                           [](const Packet& a, const Packet& b) { return a.due_ns < b.due_ns; });
+      outgoing_.insert(place, again);
+    }
   }
 
   void reboot(int64_t now_ns) {
@@ -136,12 +152,17 @@ class FakeAutopilot {
 
   void send_stream(uint32_t id, int64_t now_ns) {
     const TrueMotion truth = motion(now_ns);
-    const auto boot_ms = static_cast<uint32_t>(boot_time_ns(now_ns) / kMs);
+    const auto boot_ms = stamps ? static_cast<uint32_t>(boot_time_ns(now_ns) / kMs) : 0u;
     const Eigen::Quaternionf q = truth.ned_from_body.rotation.cast<float>();
     const Eigen::Vector3f p = truth.ned_from_body.translation.cast<float>(),
                           w = truth.body_rate.cast<float>(), v = truth.body_velocity_in_ned.cast<float>();
     if (id == AttitudeQuaternion::kId) {
       send(AttitudeQuaternion{boot_ms, q.w(), q.x(), q.y(), q.z(), w.x(), w.y(), w.z(), {}}, now_ns);
+    } else if (id == Attitude::kId) {
+      const YawPitchRoll a = ypr_from_rotation(truth.ned_from_body.rotation);
+      send(Attitude{boot_ms, static_cast<float>(a.roll), static_cast<float>(a.pitch),
+                    static_cast<float>(a.yaw), w.x(), w.y(), w.z()},
+           now_ns);
     } else if (id == LocalPositionNed::kId) {
       send(LocalPositionNed{boot_ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()}, now_ns);
     } else if (id == Odometry::kId) {
@@ -179,7 +200,7 @@ class FakeAutopilot {
     if (const auto m = decode<Statustext>(frame)) texts.push_back(*m);
     if (const auto m = decode<CommandLong>(frame)) handle_command(*m, now_ns);
     if (const auto m = decode<ParamRequestRead>(frame)) handle_parameter(text_of(m->param_id), now_ns);
-    if (const auto m = decode<Timesync>(frame)) {
+    if (const auto m = decode<Timesync>(frame); m && !unanswered.count(Timesync::kId)) {
       if (m->tc1 != 0) {
         answer = *m;
       } else {
@@ -192,12 +213,25 @@ class FakeAutopilot {
     const auto id = static_cast<uint32_t>(command.param1);
     CommandAck ack;
     ack.command = command.command;
-    if (command.command == mav_command::kRequestMessage && id == AutopilotVersion::kId) {
-      AutopilotVersion version;
-      version.flight_sw_version = 0x04060000;
-      send(version, now_ns);
+    if (command.command == mav_command::kRequestMessage) {
+      ++requests[id];
+      if (unanswered.count(id)) return;
+      if (unsupported.count(id)) ack.result = mav_result::kUnsupported;
+      send(ack, now_ns);
+      if (unsupported.count(id)) return;
+      if (id == AutopilotVersion::kId) {
+        AutopilotVersion version;
+        version.flight_sw_version = 0x04060000;
+        send(version, now_ns);
+      } else if (id == Heartbeat::kId) {
+        send_heartbeat(now_ns);
+      } else if (only_answers) {
+        send_stream(id, now_ns);
+      }
+      return;
     } else if (command.command == mav_command::kSetMessageInterval) {
       ++intervals[id];
+      if (only_answers) return;
       if (deaf_requests > 0) {
         --deaf_requests;
         return;

@@ -51,6 +51,11 @@ const auto kIsNotZero = [](double v) { return v != 0; };
 // ---- Links and clocks, alike for all.
 
 void examine_clock(Examination& e) {
+  if (!e.is.clock && e.is.asked) {
+    return e.add(Severity::kWarning, "clock", "unknown",
+                 "answers count as of the middle of their round trip, and may be off by half of it",
+                 "have it answer TIMESYNC or SYSTEM_TIME, on a quicker line");
+  }
   if (!e.is.clock) {
     return e.add(Severity::kError, "TIMESYNC", "unanswered",
                  "without it no attitude of the autopilot can be put beside a picture",
@@ -296,6 +301,7 @@ VehicleSnapshot snapshot_of(const VehicleLink& link, LandingProfile profile, int
   is.clock = link.clock().estimate(now_ns);
   is.odometry_hz = link.rate_hz(Odometry::kId, now_ns);
   is.global_hz = link.rate_hz(GlobalPositionInt::kId, now_ns);
+  is.asked = link.asks_each();
   is.asked_for_time = link.clock().statistics().answered;
   is.attitude_hz = std::max(
       {link.rate_hz(AttitudeQuaternion::kId, now_ns), link.rate_hz(Attitude::kId, now_ns), is.odometry_hz});

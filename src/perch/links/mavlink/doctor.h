@@ -24,7 +24,8 @@ struct VehicleSnapshot {
   double attitude_hz = 0;
   double position_hz = 0;  // ODOMETRY or LOCAL_POSITION_NED, whichever comes
   double odometry_hz = 0;
-  double global_hz = 0;         // GLOBAL_POSITION_INT
+  double global_hz = 0;  // GLOBAL_POSITION_INT
+  bool asked = false;    // it answers only: without a clock its answers are placed by their round trips
   uint64_t asked_for_time = 0;  // how often the autopilot asked for our time
   double range_hz = 0;          // of a rangefinder that looks down
   double lost_fraction = 0;     // of the autopilot's frames

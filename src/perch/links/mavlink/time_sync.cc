@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace perch::mavlink {
 namespace {
@@ -55,18 +56,22 @@ std::optional<Timesync> TimeSync::receive(const Timesync& message, int64_t arriv
     ++statistics_.foreign;
     return std::nullopt;
   }
-  const int64_t round_trip = arrival_ns - *asked;
-  const int64_t middle = *asked + round_trip / 2;
-  *asked = 0;
+  const int64_t sent_ns = std::exchange(*asked, 0);
   ++statistics_.heard;
+  exchange(sent_ns, arrival_ns, message.tc1);
+  return std::nullopt;
+}
+
+void TimeSync::exchange(int64_t sent_ns, int64_t arrival_ns, int64_t remote_ns) {
+  const int64_t round_trip = arrival_ns - sent_ns;
+  const int64_t middle = sent_ns + round_trip / 2;
   // A remote time of more than 146 years is none: the difference must not overflow.
   constexpr int64_t kLongest = int64_t{1} << 62;
-  if (message.tc1 < 0 || message.tc1 > kLongest) {
+  if (remote_ns < 0 || remote_ns > kLongest) {
     ++statistics_.outliers;
-    return std::nullopt;
+    return;
   }
-  take({middle, message.tc1 - middle, round_trip});
-  return std::nullopt;
+  take({middle, remote_ns - middle, round_trip});
 }
 
 void TimeSync::take(const Sample& sample) {

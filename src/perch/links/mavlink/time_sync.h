@@ -47,6 +47,9 @@ class TimeSync {
   // Takes an answer in; gives the reply to a question.
   std::optional<Timesync> receive(const Timesync& message, int64_t arrival_ns);
 
+  // An exchange by other messages: the remote clock said `remote_ns` between the two moments of ours.
+  void exchange(int64_t sent_ns, int64_t arrival_ns, int64_t remote_ns);
+
   // Empty until three answers came, or when the last is so long ago that the clocks may have drifted apart.
   std::optional<ClockEstimate> estimate(int64_t now_ns) const;
 

@@ -18,13 +18,20 @@ constexpr int64_t kFrameWithin = 200 * kMs;
 constexpr int64_t kAhead = 20 * kMs, kBehind = 300 * kMs;
 constexpr int64_t kVersionPeriod = 2 * kSecond;
 constexpr size_t kMaxTexts = 64;
+// The middle of a longer exchange is off by up to 75 ms: at 1 rad/s more than any attitude is worth. At 9600
+// baud it takes 90 ms.
+constexpr int64_t kLongestExchange = 150 * kMs;
+// Questions for the time that are never answered take the line from others.
+constexpr uint64_t kTriesForTime = 5;
 
 }  // namespace
 
 VehicleLink::VehicleLink(const VehicleLinkOptions& options, Signing* signing)
     : options_(options),
       parser_(signing),
-      writer_(options.system ? options.system : 1, options.component, signing) {}
+      writer_(options.system ? options.system : 1, options.component, signing) {
+  if (options_.ask_each) requests_.want({{Heartbeat::kId, 1}});
+}
 
 void VehicleLink::receive(std::span<const uint8_t> bytes, int64_t arrival_ns, bool datagram) {
   const auto on_frame = [&](const Frame& frame) { handle(frame, arrival_ns); };
@@ -52,21 +59,18 @@ std::vector<uint8_t> VehicleLink::tick(int64_t now_ns) {
     heartbeat.mavlink_version = kMavlinkVersion;
     send(heartbeat);
   }
+  if (options_.ask_each) ask_for_a_message(now_ns);
   if (state_ == LinkState::kUp) ask_for_things(now_ns);
   return std::exchange(out_, {});
 }
 
 void VehicleLink::ask_for_things(int64_t now_ns) {
-  if (auto question = clock_.ask(now_ns)) {
-    question->target_system = autopilot_.system;
-    question->target_component = mav_component::kAutopilot;
-    send(*question);
-  }
-  if (auto command = streams_.ask(now_ns)) {
+  ask_for_time(now_ns);
+  if (auto command = options_.ask_each ? std::nullopt : streams_.ask(now_ns)) {
     command->target_system = autopilot_.system;
     send(*command);
   }
-  if (!autopilot_.version && now_ns >= next_version_ns_) {
+  if (!options_.ask_each && !autopilot_.version && now_ns >= next_version_ns_) {
     next_version_ns_ = now_ns + kVersionPeriod;
     CommandLong command;
     command.command = mav_command::kRequestMessage;
@@ -85,7 +89,26 @@ void VehicleLink::ask_for_things(int64_t now_ns) {
   }
 }
 
+void VehicleLink::ask_for_time(int64_t now_ns) {
+  const auto& clock = clock_.statistics();
+  if (options_.ask_each && clock.heard == 0 && clock.asked >= kTriesForTime) return;
+  auto question = clock_.ask(now_ns);
+  if (!question) return;
+  question->target_system = autopilot_.system;
+  question->target_component = mav_component::kAutopilot;
+  send(*question);
+}
+
+void VehicleLink::ask_for_a_message(int64_t now_ns) {
+  auto command = requests_.ask(now_ns);
+  if (!command) return;
+  // 0: whoever is there.
+  command->target_system = state_ == LinkState::kSilent ? options_.system : autopilot_.system;
+  send(*command);
+}
+
 void VehicleLink::handle(const Frame& frame, int64_t arrival_ns) {
+  exchange_.reset();
   if (const auto heartbeat = decode<Heartbeat>(frame)) return handle_heartbeat(*heartbeat, frame, arrival_ns);
   if (state_ == LinkState::kSilent || frame.system != autopilot_.system) {
     ++statistics_.foreign;
@@ -99,6 +122,8 @@ void VehicleLink::handle(const Frame& frame, int64_t arrival_ns) {
     return;
   }
   streams_.heard(frame.id(), arrival_ns);
+  if (frame.component == mav_component::kAutopilot && !comes_again(frame.sequence))
+    exchange_ = requests_.heard(frame.id(), arrival_ns);
   // Any message is a sign of life: on a link that loses half of them four heartbeats in a row are soon lost.
   if (frame.component == mav_component::kAutopilot) last_heard_ns_ = arrival_ns;
   handle_of_autopilot(frame, arrival_ns);
@@ -116,6 +141,7 @@ void VehicleLink::handle_heartbeat(const Heartbeat& heartbeat, const Frame& fram
   }
   ++statistics_.heartbeats;
   last_heard_ns_ = arrival_ns;
+  requests_.heard(Heartbeat::kId, arrival_ns);
   if (state_ != LinkState::kUp) come_up(heartbeat, frame.system);
   streams_.heard(Heartbeat::kId, arrival_ns);
   autopilot_.type = heartbeat.type;
@@ -132,6 +158,7 @@ void VehicleLink::come_up(const Heartbeat& heartbeat, uint8_t system) {
   autopilot_.autopilot = heartbeat.autopilot;
   writer_.set_system(system);
   streams_.want(wanted_streams());
+  if (options_.ask_each) requests_.want(wanted_messages());
   parameters_.read(landing_parameters(heartbeat.autopilot));
   next_version_ns_ = 0;
 }
@@ -151,6 +178,14 @@ std::vector<WantedStream> VehicleLink::wanted_streams() const {
   if (autopilot_.is_px4()) streams.push_back({GlobalPositionInt::kId, 1});
   if (options_.gimbal) streams.push_back({GimbalDeviceAttitudeStatus::kId, options_.gimbal_hz});
   return streams;
+}
+
+std::vector<WantedStream> VehicleLink::wanted_messages() const {
+  return {{Attitude::kId, options_.attitude_hz},
+          {LocalPositionNed::kId, options_.position_hz},
+          {SystemTime::kId, 2},
+          {Heartbeat::kId, 1},
+          {AutopilotVersion::kId, 0.5}};
 }
 
 void VehicleLink::handle_of_autopilot(const Frame& frame, int64_t arrival_ns) {
@@ -173,6 +208,7 @@ void VehicleLink::handle_of_autopilot(const Frame& frame, int64_t arrival_ns) {
       return handle_command_ack(*decode<CommandAck>(frame), arrival_ns);
     case AutopilotVersion::kId:
       autopilot_.version = decode<AutopilotVersion>(frame);
+      requests_.drop(AutopilotVersion::kId);
       return;
     case ExtendedSysState::kId:
       autopilot_.landed_state = decode<ExtendedSysState>(frame)->landed_state;
@@ -196,24 +232,53 @@ void VehicleLink::handle_timesync(const Timesync& message, const Frame& frame, i
     reply->target_component = frame.component;
     send(*reply);
   }
-  if (clock_.statistics().steps != clock_steps_) {
-    clock_steps_ = clock_.statistics().steps;
-    // What is there was placed by a clock that has been set, or by one that booted.
-    history_.clear();
-    unix_minus_monotonic_ns_.reset();
-  }
+  notice_clock_steps();
+}
+
+void VehicleLink::notice_clock_steps() {
+  if (clock_.statistics().steps == clock_steps_) return;
+  clock_steps_ = clock_.statistics().steps;
+  // What is there was placed by a clock that has been set, or by one that booted.
+  history_.clear();
+  unix_minus_monotonic_ns_.reset();
+}
+
+// SYSTEM_TIME's time is that of the answer, as TIMESYNC's, but cut to whole ms. (An attitude's is that of the
+// last time it was computed, which may be long before the question.)
+void VehicleLink::take_clock_of(const SystemTime& message) {
+  if (!exchange_ || message.time_boot_ms == 0 || message.time_boot_ms == last_boot_ms_) return;
+  last_boot_ms_ = message.time_boot_ms;
+  const int64_t remote_ns = message.time_boot_ms * kMs + kMs / 2;
+  clock_.exchange(exchange_->sent_ns - kMs / 2, exchange_->arrival_ns + kMs / 2, remote_ns);
+  notice_clock_steps();
+}
+
+// A datagram that the network delivers twice has a number from before; as the answer to a newer question it
+// would be of a wrong time. An autopilot that has booted begins at 0, and some never count: after eight in a
+// row it is that.
+bool VehicleLink::comes_again(uint8_t sequence) {
+  constexpr uint8_t kRecent = 64;
+  const bool recent = last_sequence_ && static_cast<uint8_t>(*last_sequence_ - sequence) < kRecent;
+  recent_in_a_row_ = recent ? recent_in_a_row_ + 1 : 0;
+  if (recent && recent_in_a_row_ < 8) return true;
+  last_sequence_ = sequence;
+  return false;
+}
+
+std::optional<int64_t> VehicleLink::halfway() const {
+  if (!exchange_ || exchange_->round_trip_ns() > kLongestExchange) return std::nullopt;
+  return exchange_->sent_ns + exchange_->round_trip_ns() / 2;
 }
 
 std::optional<int64_t> VehicleLink::plausible(std::optional<int64_t> time_ns, int64_t arrival_ns) {
-  if (!time_ns || clock_.doubtful()) {
-    ++statistics_.times_unknown;
-    return std::nullopt;
+  const bool unknown = !time_ns || clock_.doubtful();
+  if (!unknown && *time_ns <= arrival_ns + kAhead && *time_ns >= arrival_ns - kBehind) return time_ns;
+  if (const auto middle_ns = halfway()) {
+    ++statistics_.times_by_round_trip;
+    return middle_ns;
   }
-  if (*time_ns > arrival_ns + kAhead || *time_ns < arrival_ns - kBehind) {
-    ++statistics_.times_implausible;
-    return std::nullopt;
-  }
-  return time_ns;
+  ++(unknown ? statistics_.times_unknown : statistics_.times_implausible);
+  return std::nullopt;
 }
 
 template <class Message>
@@ -250,9 +315,11 @@ void VehicleLink::handle_command_ack(const CommandAck& ack, int64_t arrival_ns) 
   const bool to_us = (ack.target_system == 0 || ack.target_system == writer_.system()) &&
                      (ack.target_component == 0 || ack.target_component == writer_.component());
   if (to_us && ack.command == mav_command::kSetMessageInterval) streams_.acknowledged(ack.result, arrival_ns);
+  if (to_us && ack.command == mav_command::kRequestMessage) requests_.acknowledged(ack.result, arrival_ns);
 }
 
 void VehicleLink::handle_system_time(const SystemTime& message, int64_t arrival_ns) {
+  if (options_.ask_each) take_clock_of(message);
   // Before it has the time from satellites it counts from 0, or from when its firmware was made.
   constexpr uint64_t k2020_us = 1'577'836'800ULL * 1'000'000, k2100_us = 4'102'444'800ULL * 1'000'000;
   if (message.time_unix_usec < k2020_us || message.time_unix_usec > k2100_us) return;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "perch/links/mavlink/frame.h"
+#include "perch/links/mavlink/message_requests.h"
 #include "perch/links/mavlink/messages.h"
 #include "perch/links/mavlink/numbers.h"
 #include "perch/links/mavlink/parameters.h"
@@ -27,6 +28,9 @@ struct VehicleLinkOptions {
       100;  // at 50 Hz a turn of 5 rad/s^2 is off by 0.25 mrad between samples; fast links bear it
   double position_hz = 30;
   double gimbal_hz = 50;
+  // It sends nothing by itself: each message is asked for, one at a time, at these rates or as fast as it
+  // answers.
+  bool ask_each = false;
   bool gimbal = false;  // ask for the gimbal's stream: only where a gimbal turns the camera
 };
 
@@ -53,10 +57,11 @@ struct Autopilot {
 struct VehicleLinkStatistics {
   uint64_t heartbeats = 0;
   uint64_t times_up = 0, times_lost = 0;
-  uint64_t foreign = 0;            // frames of other systems, and of components that are not ours to hear
-  uint64_t times_unknown = 0;      // samples that came before the clocks were matched
-  uint64_t times_implausible = 0;  // samples from the future, or from long before they came
-  uint64_t samples_refused = 0;    // not finite, out of order, or from the lesser of two sources
+  uint64_t foreign = 0;              // frames of other systems, and of components that are not ours to hear
+  uint64_t times_unknown = 0;        // samples that came before the clocks were matched
+  uint64_t times_implausible = 0;    // samples from the future, or from long before they came
+  uint64_t times_by_round_trip = 0;  // samples asked for and placed halfway between question and answer
+  uint64_t samples_refused = 0;      // not finite, out of order, or from the lesser of two sources
 };
 
 struct VehicleText {
@@ -74,6 +79,11 @@ struct VehicleText {
 //
 // It finds the autopilot, sends our heartbeat, matches the clocks, asks for streams, version and parameters,
 // and keeps what the vehicle did on our clock. One thread at a time.
+//
+// Of an autopilot that only answers (ask_each) nothing comes unasked, no heartbeat either. Its clock is
+// matched by TIMESYNC where it answers that, else by SYSTEM_TIME, whose time is that of the answer. Where
+// neither is there, or a message has no time that can be right, it is of the middle between question and
+// answer: off by half the round trip at the most.
 class VehicleLink {
  public:
   // `signing` may be null and must outlive the link.
@@ -102,6 +112,8 @@ class VehicleLink {
   // 0 for one that does not come.
   double rate_hz(uint32_t message_id, int64_t now_ns) const { return streams_.rate_hz(message_id, now_ns); }
   const StreamRequests& streams() const { return streams_; }
+  bool asks_each() const { return options_.ask_each; }
+  const MessageRequests& requests() const { return requests_; }
   // Wall clock minus our monotonic one as SYSTEM_TIME has it, ns: for file names and logs.
   std::optional<int64_t> unix_minus_monotonic_ns() const { return unix_minus_monotonic_ns_; }
   // The autopilot's STATUSTEXTs since the last call.
@@ -115,6 +127,8 @@ class VehicleLink {
   void handle_heartbeat(const Heartbeat& heartbeat, const Frame& frame, int64_t arrival_ns);
   void handle_of_autopilot(const Frame& frame, int64_t arrival_ns);
   void handle_gimbal(const Frame& frame, int64_t arrival_ns);
+  void take_clock_of(const SystemTime& message);
+  void notice_clock_steps();
   void handle_timesync(const Timesync& message, const Frame& frame, int64_t arrival_ns);
   void handle_command_ack(const CommandAck& ack, int64_t arrival_ns);
   void handle_system_time(const SystemTime& message, int64_t arrival_ns);
@@ -123,9 +137,14 @@ class VehicleLink {
   void handle_sample(const Frame& frame, int64_t arrival_ns);
   // A time of the autopilot's clock on ours; empty, and counted, when it cannot be right.
   std::optional<int64_t> plausible(std::optional<int64_t> time_ns, int64_t arrival_ns);
+  std::optional<int64_t> halfway() const;
+  bool comes_again(uint8_t sequence);
   void come_up(const Heartbeat& heartbeat, uint8_t system);
   std::vector<WantedStream> wanted_streams() const;
+  std::vector<WantedStream> wanted_messages() const;
   void ask_for_things(int64_t now_ns);
+  void ask_for_time(int64_t now_ns);
+  void ask_for_a_message(int64_t now_ns);
   template <class Message>
   void send(const Message& message) {
     writer_.append(out_, message);
@@ -142,6 +161,11 @@ class VehicleLink {
   uint64_t clock_steps_ = 0;
   VehicleHistory history_;
   StreamRequests streams_;
+  MessageRequests requests_;
+  std::optional<MessageExchange> exchange_;  // that brought the message which is being handled
+  std::optional<uint8_t> last_sequence_;     // of the autopilot's frames
+  int recent_in_a_row_ = 0;
+  uint32_t last_boot_ms_ = 0;  // of SYSTEM_TIME
   ParameterReader parameters_;
   std::deque<VehicleText> texts_;
   std::optional<int64_t> unix_minus_monotonic_ns_;
