@@ -34,7 +34,7 @@ std::string number(double value, int digits = 3) {
 void check_times(const MountProblem& problem, const MountFlight& flight) {
   if (flight.nav.samples.size() < 2) {
     throw MountError(flight.name +
-                     ": no navigation: expected mav0/nav0/data.csv or "
+                     ": no navigation with an attitude: expected mav0/nav0/data.csv or "
                      "state_groundtruth_estimate0, without which the mount cannot be told from the pad");
   }
   if (flight.sightings.size() < 4) {

@@ -126,6 +126,8 @@ ReadFlight read_mount_flight(const RunConfig& config, const std::filesystem::pat
   result.body_from_camera = flight.body_from_camera;
   const CameraModel camera = camera_of(config, flight);
   result.flight = {flight.name, camera, {}, flight.nav, flight.gimbal};
+  // Positions alone tell nothing of how the camera sits.
+  std::erase_if(result.flight.nav.samples, [](const NavSample& s) { return !s.knows_attitude(); });
   const auto source = open_image_source("flight:" + folder.string(), config.channel);
   std::atomic<bool> stop = false;
   using StretchPtr = std::shared_ptr<Stretch>;

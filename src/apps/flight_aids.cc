@@ -23,7 +23,7 @@ Estimator::Aid FlightAids::at(int64_t camera_time_ns) {
 Estimator::Aid FlightAids::from_flight(int64_t camera_time_ns) {
   Estimator::Aid aid;
   if (const auto nav = flight_.nav.at(navigation_time_ns(chain_, camera_time_ns))) {
-    aid.world_from_body = nav->world_from_body.rotation;
+    if (nav->knows_attitude()) aid.world_from_body = nav->world_from_body.rotation;
   }
   const double latency = chain_.pan_tilt ? chain_.pan_tilt->latency : 0;
   if (const auto head = gimbal_at(flight_.gimbal, camera_time_ns + std::llround(1e9 * latency))) {
@@ -42,7 +42,7 @@ std::vector<AutopilotSample> FlightAids::said_until(int64_t camera_time_ns) {
   for (; next_ < samples.size() && samples[next_].timestamp_ns <= until_ns; ++next_) {
     AutopilotSample sample;
     sample.timestamp_ns = camera_time_ns - (until_ns - samples[next_].timestamp_ns);
-    sample.world_from_body = samples[next_].world_from_body.rotation;
+    if (samples[next_].knows_attitude()) sample.world_from_body = samples[next_].world_from_body.rotation;
     sample.body_velocity_in_world = samples[next_].body_velocity_in_world;
     said.push_back(sample);
   }

@@ -7,6 +7,7 @@
 #include "perch/config/section.h"
 #include "perch/estimator/run_config.h"
 #include "perch/links/mavlink/mavlink_options.h"
+#include "perch/links/nmea/receiver.h"
 #include "perch/links/stream_url.h"
 #include "perch/station/station_options.h"
 
@@ -17,13 +18,15 @@ enum class NavSource {
   kNone,
   kFlight,   // what the replayed flight has recorded
   kMavlink,  // an autopilot
+  kNmea,     // a receiver of satellites, perhaps with an inertial unit: for comparison, and for gravity
 };
 
 // What perch-live reads of its YAML file (docs/FORMATS.md, Configuration).
 struct LiveConfig {
   RunConfig run;
   NavSource nav = NavSource::kNone;
-  std::optional<StreamUrl> autopilot;  // with kMavlink
+  std::optional<StreamUrl> nav_url;  // with kMavlink and kNmea
+  nmea::ReceiverOptions receiver;    // with kNmea
   mavlink::MavlinkOptions mavlink;
   std::optional<PtzOptions> ptz;  // a head that turns the camera
   std::filesystem::path record;   // outputs.record; empty: nothing is recorded
@@ -31,9 +34,9 @@ struct LiveConfig {
   StationOptions station;
 };
 
-// Of a replay `nav: mavlink+URL` means what the flight has recorded of it: the configuration of the live run
-// can be used as it is. Nothing is sent then, and nothing recorded. Throws ConfigError for anything that is
-// not as it should be; nothing starts then.
+// Of a replay `nav: mavlink+URL` and the like mean what the flight has recorded of it: the configuration of
+// the live run can be used as it is. Nothing is sent then, and nothing recorded. Throws ConfigError for
+// anything that is not as it should be; nothing starts then.
 LiveConfig read_live_config(Section root);
 
 // camera.source is a recorded flight.

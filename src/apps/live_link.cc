@@ -53,7 +53,7 @@ LiveLink::LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap, 
       sends_(config.mavlink.send),
       frames_(config.run.frames),
       time_offset_ns_(-navigation_time_ns(config.run.frames, 0)),
-      stream_(*config.autopilot),
+      stream_(*config.nav_url),
       signing_(config.mavlink.signing ? std::make_unique<mavlink::Signing>(*config.mavlink.signing,
                                                                            mavlink::signing_time(unix_ns()))
                                       : nullptr),
@@ -302,6 +302,13 @@ nlohmann::ordered_json LiveLink::summary() const {
                    {"times_unknown", heard.times_unknown},
                    {"times_implausible", heard.times_implausible},
                    {"samples_refused", heard.samples_refused}};
+  if (link_.asks_each()) {
+    const auto& requests = link_.requests().statistics();
+    json["requests"] = {
+        {"asked", requests.asked},         {"answered", requests.answered},
+        {"timed_out", requests.timed_out}, {"refused", requests.refused},
+        {"unasked", requests.unasked},     {"times_by_round_trip", heard.times_by_round_trip}};
+  }
   const auto& asked = link_.clock().statistics();
   json["clock"] = {{"asked", asked.asked},       {"heard", asked.heard}, {"answered", asked.answered},
                    {"outliers", asked.outliers}, {"steps", asked.steps}, {"sigma_us", nullptr},

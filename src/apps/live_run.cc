@@ -54,6 +54,8 @@ LiveRun::LiveRun(const LiveConfig& config, OpenedSource source, LinkTap tap, OnE
   if (config.nav == NavSource::kMavlink) {
     link_ = std::make_unique<LiveLink>(config, latency_, std::move(tap),
                                        with_mount_of(config, source_).frames, source_.camera);
+  } else if (config.nav == NavSource::kNmea) {
+    receiver_ = std::make_unique<LiveNmea>(config, std::move(tap));
   } else if (config.nav == NavSource::kFlight && source_.flight) {
     aids_ = std::make_unique<FlightAids>(*source_.flight, with_mount_of(config, source_).frames, config.run);
   }
@@ -148,6 +150,8 @@ Estimator::Aid LiveRun::aid_at(int64_t camera_time_ns) {
   Estimator::Aid aid;
   if (link_) {
     aid = link_->aid_at(camera_time_ns);
+  } else if (receiver_) {
+    aid = receiver_->aid_at(camera_time_ns);
   } else if (aids_) {
     aid = aids_->at(camera_time_ns);
   }
@@ -176,8 +180,10 @@ void LiveRun::hand_on(const LiveFrame& picture, const Estimate& estimate) {
 
 uint64_t LiveRun::progress() const {
   // The slowest of them: one that is stuck holds all up.
-  const uint64_t both = std::min(capture_progress_.load(), estimator_progress_.load());
-  return link_ ? std::min(both, link_->progress()) : both;
+  uint64_t slowest = std::min(capture_progress_.load(), estimator_progress_.load());
+  if (link_) slowest = std::min(slowest, link_->progress());
+  if (receiver_) slowest = std::min(slowest, receiver_->progress());
+  return slowest;
 }
 
 mavlink::PadState LiveRun::pad_state() const {
@@ -216,6 +222,10 @@ nlohmann::ordered_json LiveRun::summary() const {
   if (link_) {
     json["cpu_s"]["link"] = link_->cpu_seconds();
     json["mavlink"] = link_->summary();
+  }
+  if (receiver_) {
+    json["cpu_s"]["link"] = receiver_->cpu_seconds();
+    json["nmea"] = receiver_->summary();
   }
   if (ptz_) {
     json["cpu_s"]["ptz"] = ptz_->cpu_seconds();

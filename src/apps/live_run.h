@@ -11,6 +11,7 @@
 
 #include "flight_aids.h"
 #include "live_link.h"
+#include "live_nmea.h"
 #include "live_ptz.h"
 #include "live_report.h"
 #include "live_source_of.h"
@@ -47,7 +48,8 @@ class LiveRun {
   // Null without a head that is moved. What was done, in a sentence.
   nlohmann::json head_status() const;
   std::string centre_head();
-  LiveLink* link() { return link_.get(); }  // null without an autopilot
+  LiveLink* link() { return link_.get(); }          // null without an autopilot
+  LiveNmea* receiver() { return receiver_.get(); }  // null without one
   // Of the last frame; empty before the first pose.
   std::optional<VehicleState> last_state() const;
   LiveLatency& latency() { return latency_; }
@@ -71,6 +73,7 @@ class LiveRun {
   Estimator estimator_;
   NewestFrame slot_;
   std::unique_ptr<LiveLink> link_;
+  std::unique_ptr<LiveNmea> receiver_;
   std::unique_ptr<FlightAids> aids_;
   std::unique_ptr<LivePtz> ptz_;
 

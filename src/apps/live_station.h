@@ -37,6 +37,7 @@ class LiveStation {
 
   const FrameChain frames_;
   const bool recorded_;
+  const double ahead_;   // how long navigation is carried on, s
   std::mutex mutex_;     // of navigation_
   NavTrack navigation_;  // a replay's, all of it; an autopilot's, the last second
   int64_t told_ns_ = 0;

@@ -202,6 +202,9 @@ class Supervisor {
     if (run_.link()) {
       for (const std::string& what : run_.link()->take_events()) event(what);
     }
+    if (run_.receiver()) {
+      for (const std::string& what : run_.receiver()->take_events()) event(what);
+    }
     if (const std::string problem = run_.camera_counters().last_problem; problem != told_problem_) {
       told_problem_ = problem;
       if (!problem.empty()) event("camera: " + problem);
@@ -233,6 +236,7 @@ class Supervisor {
                        std::to_string(run_.frames().of(EstimateStatus::kOk)) + " of " +
                        std::to_string(run_.frames().all()) + " frames with a pose";
     if (run_.link()) line += "; " + run_.link()->status();
+    if (run_.receiver()) line += "; " + run_.receiver()->status();
     if (const auto recorder = recording_.recorder()) {
       const auto counters = recorder->counters();
       line += "; recorded " + std::to_string(counters.frames_written) + ", dropped " +

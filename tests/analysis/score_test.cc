@@ -52,6 +52,27 @@ TEST(Score, DifferenceIsVisionMinusNavigationInPadAxes) {
   EXPECT_NEAR(score.frames[0].error->position, 0.1, 64 * kEpsilon * 40);
 }
 
+// A receiver with one antenna.
+TEST(Score, NavigationWithoutAnAttitudeIsComparedInPosition) {
+  TestRng rng;
+  MadeUpFlight made;
+  made.offset << 0.03, -0.02, 0.05, 0.01, -0.02, 0.015;
+  FlightResult result = make_flight(made, rng);
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  for (NavSample& sample : result.flight.nav.samples)
+    sample.world_from_body.rotation = Eigen::Quaterniond(unknown, unknown, unknown, unknown);
+  const FlightScore score = score_flight(result);
+  ASSERT_EQ(score.comparison, Comparison::kCompared);
+  EXPECT_EQ(score.position.count, 100u);
+  for (size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(score.states[i].mean, made.offset[static_cast<Eigen::Index>(i)], 1e-12);
+  for (size_t i = 3; i < 6; ++i) EXPECT_EQ(score.states[i].count, 0u);
+  EXPECT_EQ(score.rotation.count, 0u);
+  EXPECT_EQ(score.consistency.count, 0u);
+  EXPECT_EQ(score.attribution.count, 0u);
+  EXPECT_TRUE(std::isfinite(score.bins[0].position_rms));
+}
+
 TEST(Score, NavigationIsAskedAtItsOwnTime) {
   TestRng rng;
   FlightResult result = make_flight({.frames = 50}, rng);

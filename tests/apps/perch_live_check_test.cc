@@ -31,7 +31,7 @@ TEST_F(PerchLive, RefusesAWrongConfigurationWithItsPlace) {
   EXPECT_THAT(error_of("outputs.stations.listen=8080"), HasSubstr("outputs.stations: expected one of"));
   EXPECT_THAT(error_of("outputs.station.listen=8080"),
               HasSubstr("outputs.station.listen: expected ADDRESS:PORT"));
-  EXPECT_THAT(error_of("nav=udp:1:2"), HasSubstr("nav: expected none, flight or mavlink+URL"));
+  EXPECT_THAT(error_of("nav=udp:1:2"), HasSubstr("nav: expected none, flight, mavlink+URL"));
   EXPECT_THAT(error_of("nav=mavlink+udp:host"), HasSubstr("expected HOST:PORT"));
   EXPECT_THAT(error_of("nav=none"),
               HasSubstr("outputs.mavlink.send: expected false, as nav is no autopilot"));

@@ -80,6 +80,41 @@ TEST_F(OverASerialLine, ThatLosesHalvesOfFramesPx4sEstimatorIsToldWithItsUncerta
   EXPECT_EQ(mavlink["heard"]["times_lost"], 0);
 }
 
+class OverASerialLineThatOnlyAnswers : public PerchLive {
+ protected:
+  OverASerialLineThatOnlyAnswers() : PerchLive(std::make_unique<mavlink::PtyWire>()) {
+    autopilot_.with([](auto& autopilot) { autopilot.only_answers = true; });
+  }
+};
+
+TEST_F(OverASerialLineThatOnlyAnswers, ItIsAskedForEachMessageAndToldWhereThePadIs) {
+  // The paper's has no clock that anybody could match.
+  autopilot_.with([](auto& autopilot) {
+    autopilot.unanswered = {mavlink::Timesync::kId, mavlink::SystemTime::kId};
+    autopilot.loss = 0.02;
+  });
+  std::string url = autopilot_.url();
+  url.replace(0, std::string("mavlink").size(), "mavlink-request");
+  ChildProgram live = start({"--set", "nav=" + url});
+  fly_with(live);
+  ASSERT_TRUE(landing_targets_come(0, 20)) << live.err();
+  EXPECT_EQ(live.stop(), 0) << live.err();
+  const json mavlink = summary()["mavlink"];
+  EXPECT_EQ(mavlink["autopilot"], "ArduPilot 4.6.0, system 1");
+  EXPECT_GT(mavlink["requests"]["answered"], 50);
+  EXPECT_GT(mavlink["requests"]["timed_out"], 0);
+  EXPECT_GT(mavlink["requests"]["times_by_round_trip"], 20);
+  EXPECT_TRUE(autopilot_.with([](auto& a) { return a.intervals.empty(); }));
+  const auto targets = autopilot_.landing_targets();
+  size_t off = 0;
+  for (const auto& [arrived_ns, target] : targets) {
+    // ArduPilot takes it for PLND_LAG old.
+    const Vector3d truth = pad_in_body_at(arrived_ns - 62'500'000);
+    off += (Vector3d(target.x, target.y, target.z) - truth).norm() > 0.1;
+  }
+  EXPECT_LE(off, targets.size() / 10);
+}
+
 class Signed : public PerchLive {
  protected:
   Signed()

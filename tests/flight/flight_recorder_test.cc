@@ -26,6 +26,9 @@ TEST_F(Recording, IsAFlightThatReadsBackAlike) {
   }
   const NavSample nav{kStartNs, {Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {1.0 / 3, 2, 3}}, {4, 5, 0.1}};
   r->add_navigation(nav);
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  r->add_navigation(
+      {kStartNs + 1, {Eigen::Quaterniond(unknown, unknown, unknown, unknown), {7, 8, 9}}, {4, 5, 6}});
   r->add_event(5, "locked on,\nsaid twice");
   const std::vector<uint8_t> heartbeat{0xFD, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0x12, 0x34};
   r->add_bytes(FlightRecorder::Direction::kOut, 1'000'000, heartbeat);
@@ -36,7 +39,8 @@ TEST_F(Recording, IsAFlightThatReadsBackAlike) {
   EXPECT_EQ(r->counters().last_problem, "");
 
   const Recorded recorded(r->folder());
-  EXPECT_THAT(recorded.problems, IsEmpty());
+  ASSERT_EQ(recorded.problems.size(), 1u);
+  EXPECT_THAT(recorded.problems[0], HasSubstr("nav0/data.csv: 1 rows without an attitude"));
   ASSERT_EQ(recorded.frames.size(), 20u);
   ASSERT_EQ(recorded.aids.size(), 20u);
   EXPECT_EQ(recorded.states.size(), 20u);
@@ -62,7 +66,10 @@ TEST_F(Recording, IsAFlightThatReadsBackAlike) {
   EXPECT_EQ(flight.camera->lens(), camera.lens());
   EXPECT_EQ(flight.camera->intrinsics(), camera.intrinsics());
   EXPECT_THAT(*flight.body_from_camera, IsNearPose(*mount, 1e-15, 0));
-  ASSERT_EQ(flight.nav.samples.size(), 1u);
+  ASSERT_EQ(flight.nav.samples.size(), 2u);
+  EXPECT_TRUE(flight.nav.samples[0].knows_attitude());
+  EXPECT_FALSE(flight.nav.samples[1].knows_attitude());
+  EXPECT_EQ(flight.nav.samples[1].world_from_body.translation, Eigen::Vector3d(7, 8, 9));
   EXPECT_EQ(flight.nav.samples[0].world_from_body.translation, nav.world_from_body.translation);
   EXPECT_EQ(flight.nav.samples[0].body_velocity_in_world, nav.body_velocity_in_world);
   ASSERT_EQ(flight.gimbal.size(), 20u);

@@ -153,6 +153,29 @@ TEST(Flight, SkipsNavRowsThatCannotBeUsed) {
                   "nav0/data.csv:8: the clock goes back or stands still at 500, row skipped"));
 }
 
+TEST(Flight, APositionWithoutAnAttitudeIsARow) {
+  const FlightFolder folder;
+  folder.write("mav0/nav0/data.csv", kNavHeader +
+                                         "1000,1,2,3,,,,,4,5,6\n"
+                                         "2000,1,2,3,1,0,0,0,4,5,6\n"
+                                         "3000,1,2,3,1,,,,4,5,6\n"
+                                         "4000,1,,3,,,,,4,5,6\n");
+  const Flight flight = folder.read();
+  ASSERT_EQ(flight.nav.samples.size(), 2U);
+  EXPECT_FALSE(flight.nav.samples[0].knows_attitude());
+  EXPECT_TRUE(flight.nav.samples[1].knows_attitude());
+  EXPECT_EQ(flight.nav.samples[0].world_from_body.translation, Eigen::Vector3d(1, 2, 3));
+  // Between the two a position is known and an attitude is not.
+  const auto between = flight.nav.at(1500);
+  ASSERT_TRUE(between);
+  EXPECT_FALSE(between->knows_attitude());
+  EXPECT_NEAR((between->world_from_body.translation - Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-5);
+  EXPECT_THAT(folder.problems(),
+              ElementsAre("nav0/data.csv:4: q_x: expected a number, found \"\", row skipped",
+                          "nav0/data.csv:5: p_y [m]: expected a number, found \"\", row skipped",
+                          "nav0/data.csv: 1 rows without an attitude, of use for positions alone"));
+}
+
 TEST(Flight, MissingVelocitiesComeFromThePositions) {
   const FlightFolder folder;
   folder.write("mav0/nav0/data.csv",

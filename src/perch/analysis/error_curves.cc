@@ -30,7 +30,7 @@ constexpr double kAll = 1 - 1e-9;
 
 struct Errors {
   std::vector<double> position, rotation;
-  std::vector<int64_t> second;  // of each
+  std::vector<int64_t> second;  // of each position
 };
 
 ErrorBin bin_of(const Errors& errors, double from, double to) {
@@ -68,7 +68,9 @@ ErrorCurve curve(std::string by, std::string unit, double scale, std::span<const
   for (const FrameRecord* frame : known) {
     Errors& errors = bins[index(scale * value_of(*frame))];
     errors.position.push_back(error_of(*frame, against_truth)->position);
-    errors.rotation.push_back(error_of(*frame, against_truth)->rotation);
+    // Of a reference without an attitude there is none.
+    const double rotation = error_of(*frame, against_truth)->rotation;
+    if (std::isfinite(rotation)) errors.rotation.push_back(rotation);
     errors.second.push_back(frame->timestamp_ns / 1'000'000'000);
   }
   for (size_t i = 0; i < bins.size(); ++i) {

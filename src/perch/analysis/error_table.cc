@@ -53,11 +53,12 @@ std::string error_table(const FlightScore& score) {
   table += format("  %-8s %9s %-3s  %9s %-3s  %9s %-3s  %9s\n", "", "RMS", "", "DC offset", "", "without it",
                   "", "max");
   for (size_t i = 0; i < 6; ++i) {
+    if (score.states[i].count == 0) continue;  // navigation tells no attitude
     table += row(std::string(kStateNames[i]), score.states[i], is_angle(i) ? kDegFromRad : kCmFromM,
                  is_angle(i) ? "deg" : "cm");
   }
   table += size_row("position", score.position, kCmFromM, "cm");
-  table += size_row("rotation", score.rotation, kDegFromRad, "deg");
+  if (score.rotation.count > 0) table += size_row("rotation", score.rotation, kDegFromRad, "deg");
   table += format("  position over range %.3f %%\n", 100 * score.relative_position_rms);
   if (score.truth) {
     table +=

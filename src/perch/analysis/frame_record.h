@@ -31,6 +31,7 @@ struct FrameError {
   SixStates difference = SixStates::Zero();  // vision minus reference; angles wrapped to (-pi, pi]
   double position = 0;                       // length of the position's difference, m
   double rotation = 0;  // angle between the two attitudes, rad: free of the ZYX angles' pole
+  // Where the reference tells no attitude, angles, rotation and seen_position are NaN.
   // Of the target's origin as the camera sees it, m: what the picture gives, before the attitude's error
   // swings the body about the pad.
   double seen_position = 0;

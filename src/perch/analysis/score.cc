@@ -6,6 +6,11 @@
 namespace perch {
 namespace {
 
+// Of a reference without an attitude there is none.
+void add_known(double value, std::vector<double>& values) {
+  if (std::isfinite(value)) values.push_back(value);
+}
+
 NormalisedErrors check_normalised(std::span<const double> values) {
   NormalisedErrors checked;
   checked.count = values.size();
@@ -34,7 +39,7 @@ Consistency check_consistency(std::span<const FrameRecord> frames, bool has_trut
     if (frame.nis && std::isfinite(*frame.nis)) nis.push_back(*frame.nis);
     const auto& error = error_of(frame, has_truth);
     if (!error) continue;
-    if (frame.range > 0) seen.push_back(error->seen_position / frame.range);
+    if (frame.range > 0) add_known(error->seen_position / frame.range, seen);
     if (error->nees) nees.push_back(*error->nees);
   }
   consistency.seen_over_range_rms = statistics(seen).rms;
@@ -55,9 +60,9 @@ void score_errors(const std::vector<const FrameRecord*>& compared, FlightScore& 
   std::vector<double> position, rotation, relative;
   for (const FrameRecord* frame : compared) {
     for (size_t i = 0; i < 6; ++i)
-      states[i].push_back(frame->error->difference[static_cast<Eigen::Index>(i)]);
+      add_known(frame->error->difference[static_cast<Eigen::Index>(i)], states[i]);
     position.push_back(frame->error->position);
-    rotation.push_back(frame->error->rotation);
+    add_known(frame->error->rotation, rotation);
     if (frame->range > 0) relative.push_back(frame->error->position / frame->range);
   }
   for (size_t i = 0; i < 6; ++i) {

@@ -60,8 +60,12 @@ RunConfig read_run_config(Section root) {
                      {{"recorded", ReplayAids::kRecorded}, {"navigation", ReplayAids::kNavigation}});
   replay.done();
   // The live program's: a batch run reads the same file and leaves them alone.
-  std::string nav = "flight";
-  root.read("nav", nav);
+  if (root.is_mapping_with("nav", "source")) {
+    root.section("nav");
+  } else {
+    std::string nav = "flight";
+    root.read("nav", nav);
+  }
   root.section("outputs");
   root.section("ptz");
   root.section("calibrate_mount");  // perch-calibrate-mount's

@@ -66,7 +66,13 @@ void append_nav(const NavSample& nav, std::string& csv) {
   append_number(csv, nav.timestamp_ns);
   const Eigen::Quaterniond& q = nav.world_from_body.rotation;
   for (const double value : nav.world_from_body.translation) append_field(csv, value);
-  for (const double value : {q.w(), q.x(), q.y(), q.z()}) append_field(csv, value);
+  for (const double value : {q.w(), q.x(), q.y(), q.z()}) {
+    if (nav.knows_attitude()) {
+      append_field(csv, value);
+    } else {
+      csv += ',';
+    }
+  }
   for (const double value : nav.body_velocity_in_world) append_field(csv, value);
   csv += '\n';
 }

@@ -42,20 +42,20 @@ Eigen::Vector3d cubic(const NavSample& a, const NavSample& b, double s, double g
 
 }  // namespace
 
-std::optional<NavSample> NavTrack::at(int64_t timestamp_ns) const {
+std::optional<NavSample> NavTrack::at(int64_t timestamp_ns, double ahead) const {
   const auto after = std::lower_bound(samples.begin(), samples.end(), timestamp_ns,
                                       [](const NavSample& s, int64_t time) { return s.timestamp_ns < time; });
   if (after != samples.end() && after->timestamp_ns == timestamp_ns) return *after;
   if (samples.empty()) return std::nullopt;
   if (after == samples.begin()) {
     const double dt = seconds(timestamp_ns, after->timestamp_ns);
-    if (dt > kMaxExtrapolation) return std::nullopt;
+    if (dt > ahead) return std::nullopt;
     return extrapolated(*after, timestamp_ns, -dt);
   }
   const NavSample& a = *std::prev(after);
   if (after == samples.end()) {
     const double dt = seconds(a.timestamp_ns, timestamp_ns);
-    if (dt > kMaxExtrapolation) return std::nullopt;
+    if (dt > ahead) return std::nullopt;
     return extrapolated(a, timestamp_ns, dt);
   }
   const NavSample& b = *after;

@@ -1,5 +1,6 @@
 #include "perch/flight/read_nav.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -26,6 +27,13 @@ constexpr std::array<ColumnName, 4> kGimbalColumns{"timestamp [ns]", "pan [rad]"
 constexpr double kMostNumber = 1e8;
 
 constexpr size_t kPoseColumns = 8;  // the velocities, which may be missing, come after them
+// The attitude, which may be missing as a whole, comes after these.
+constexpr size_t kPositionColumns = 4;
+
+bool is_blank(const CsvReader& csv, std::span<const size_t> columns) {
+  const auto fields = csv.fields();
+  return std::ranges::all_of(columns, [&](size_t c) { return c < fields.size() && fields[c].empty(); });
+}
 
 // The row's time and numbers (NaN where there is none from `required` on), or why it has none.
 std::string read_row(const CsvReader& csv, std::span<const ColumnName> names, std::span<const size_t> columns,
@@ -85,13 +93,16 @@ NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& p
     NavSample sample;
     std::array<double, 10> n;
     n.fill(std::numeric_limits<double>::quiet_NaN());
-    const std::string problem = read_row(csv, names, columns, kPoseColumns, sample.timestamp_ns, n);
+    const bool no_attitude =
+        is_blank(csv, std::span(columns).subspan(kPositionColumns, kPoseColumns - kPositionColumns));
+    const std::string problem =
+        read_row(csv, names, columns, no_attitude ? kPositionColumns : kPoseColumns, sample.timestamp_ns, n);
     if (!problem.empty()) {
       problems.push_back(csv.place() + ": " + problem);
       continue;
     }
     const Eigen::Quaterniond rotation(n[3], n[4], n[5], n[6]);
-    if (!(rotation.norm() > 1e-3 && rotation.norm() < 1e3)) {
+    if (!no_attitude && !(rotation.norm() > 1e-3 && rotation.norm() < 1e3)) {
       problems.push_back(csv.place() +
                          ": q_w q_x q_y q_z: expected a rotation, found a quaternion of length " +
                          std::to_string(rotation.norm()) + ", row skipped");
@@ -103,6 +114,11 @@ NavTrack read_nav(const std::filesystem::path& file, std::vector<std::string>& p
     places.push_back(csv.place());
   }
   csv.note_torn(problems);
+  if (const auto without =
+          std::ranges::count_if(samples, [](const NavSample& s) { return !s.knows_attitude(); })) {
+    problems.push_back(file.string() + ": " + std::to_string(without) +
+                       " rows without an attitude, of use for positions alone");
+  }
   NavTrack track{in_time_order(std::move(samples), places, problems)};
   if (const size_t filled = fill_velocities(track.samples)) {
     problems.push_back(file.string() + ": " + std::to_string(filled) +

@@ -55,6 +55,10 @@ bool VehicleHistory::add(const AttitudeQuaternion& m, int64_t time_ns) {
   return rotation && add_attitude(1, *rotation, {m.rollspeed, m.pitchspeed, m.yawspeed}, time_ns);
 }
 
+bool VehicleHistory::add(const AttitudeSample& sample) {
+  return add_attitude(1, sample.ned_from_body, sample.body_rate, sample.time_ns);
+}
+
 bool VehicleHistory::add(const Attitude& m, int64_t time_ns) {
   if (!usable({m.roll, m.pitch, m.yaw}, 100)) return false;
   const Quaterniond rotation = rotation_from_ypr({m.yaw, m.pitch, m.roll});

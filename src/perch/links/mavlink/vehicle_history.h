@@ -62,6 +62,8 @@ class VehicleHistory {
   // that gives way to a better one: ATTITUDE_QUATERNION before ATTITUDE before ODOMETRY for attitudes,
   // ODOMETRY before LOCAL_POSITION_NED for positions, as it alone tells of resets.
   bool add(const AttitudeQuaternion& message, int64_t time_ns);
+  // Of a source that speaks no MAVLink.
+  bool add(const AttitudeSample& sample);
   bool add(const Attitude& message, int64_t time_ns);
   bool add(const Odometry& message, int64_t time_ns);
   bool add(const LocalPositionNed& message, int64_t time_ns);
