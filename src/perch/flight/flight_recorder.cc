@@ -13,6 +13,7 @@
 #include "perch/flight/estimates_file.h"
 #include "perch/flight/sensor_file.h"
 #include "perch/flight/tlog.h"
+#include "perch/flight/write_nav.h"
 
 namespace perch {
 
@@ -28,8 +29,6 @@ constexpr auto kWriteEvery = 200ms;
 constexpr auto kLookAtDiskEvery = 1s;
 constexpr auto kSyncEvery = 1s;
 
-constexpr char kNavHeader[] =
-    "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z,v_x [m/s],v_y [m/s],v_z [m/s]\n";
 constexpr char kGimbalHeader[] = "#timestamp [ns],pan [rad],tilt [rad],zoom []\n";
 constexpr char kEventsHeader[] = "#timestamp [ns],event\n";
 
@@ -62,21 +61,6 @@ int64_t unix_minus_monotonic_ns() {
   return ns(std::chrono::system_clock::now()) - ns(std::chrono::steady_clock::now());
 }
 
-void append_nav(const NavSample& nav, std::string& csv) {
-  append_number(csv, nav.timestamp_ns);
-  const Eigen::Quaterniond& q = nav.world_from_body.rotation;
-  for (const double value : nav.world_from_body.translation) append_field(csv, value);
-  for (const double value : {q.w(), q.x(), q.y(), q.z()}) {
-    if (nav.knows_attitude()) {
-      append_field(csv, value);
-    } else {
-      csv += ',';
-    }
-  }
-  for (const double value : nav.body_velocity_in_world) append_field(csv, value);
-  csv += '\n';
-}
-
 // One line, whatever is in it.
 std::string event_row(int64_t timestamp_ns, std::string_view what) {
   std::string row = std::to_string(timestamp_ns) + ",";
@@ -96,7 +80,7 @@ struct FlightRecorder::Logs {
         events(disk, flight / "run" / "events.csv", kEventsHeader, kMostWaiting),
         mavlink(disk, flight / "run" / "mavlink.tlog", "", kMostWaiting),
         log(disk, flight / "run" / "log", "", kMostWaiting),
-        nav(disk, flight / "mav0" / "nav0" / "data.csv", kNavHeader, kMostWaiting),
+        nav(disk, flight / "mav0" / "nav0" / "data.csv", nav_header(), kMostWaiting),
         gimbal(disk, flight / "mav0" / "gimbal0" / "data.csv", kGimbalHeader, kMostWaiting) {
     for (AppendLog* table : {&estimates, &states, &aids, &events}) table->create();
   }
