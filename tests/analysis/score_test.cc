@@ -68,9 +68,12 @@ TEST(Score, NavigationWithoutAnAttitudeIsComparedInPosition) {
     EXPECT_NEAR(score.states[i].mean, made.offset[static_cast<Eigen::Index>(i)], 1e-12);
   for (size_t i = 3; i < 6; ++i) EXPECT_EQ(score.states[i].count, 0u);
   EXPECT_EQ(score.rotation.count, 0u);
-  EXPECT_EQ(score.consistency.count, 0u);
+  EXPECT_EQ(score.consistency.nees.count, 0u);
   EXPECT_EQ(score.attribution.count, 0u);
-  EXPECT_TRUE(std::isfinite(score.bins[0].position_rms));
+  ASSERT_FALSE(score.curves.empty());
+  for (const ErrorCurve& curve : score.curves) {
+    for (const ErrorBin& bin : curve.bins) EXPECT_EQ(std::isfinite(bin.position_rms), bin.count > 0);
+  }
 }
 
 TEST(Score, NavigationIsAskedAtItsOwnTime) {

@@ -38,9 +38,14 @@ outputs: {station: {control: true}, record: flights}
   });
   await shoot(page, 'head_light');
 
+  // The pad is 11 degrees aside; for 2 s the head looks where it looked when it was switched on.
+  const off = async () => Math.hypot(...(await fact(page, 'head')).replaceAll('−', '-').match(/-?\d+\.\d(?=°)/g).map(Number));
+  assert.ok(await off() > 3);
   assert.ok(await page.isVisible('#centre'));
   await press(page, 'h');
-  await until('the command is answered', async () => /centre/i.test(await page.textContent('#events')));
+  await until('the command is answered', async () => /the head goes to its middle/.test(await page.textContent('#events')));
+  await until('the head in its middle', async () => (await off()) < 0.5);
+  await until('it follows again', async () => (await off()) > 3);
 
   const {rows, at} = await csv(page);
   await stop(live);

@@ -107,7 +107,8 @@ bool MotionBank::see(const UncertainRigid3& pad_from_body, double gate) {
 }
 
 double MotionBank::surprise(const UncertainRigid3& pad_from_body) const {
-  return motion().surprise(motion().of_pose(pad_from_body)).squared;
+  const Motion together = predicted(0);
+  return together.surprise(together.of_pose(pad_from_body)).squared;
 }
 
 void MotionBank::meet_world(const AutopilotSample& sample) {

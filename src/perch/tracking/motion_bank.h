@@ -27,7 +27,7 @@ class MotionBank {
   // A measured pose: whether any filter believed it, its innovation squared within the gate (chi-square, 6
   // degrees of freedom). What none believes changes nothing.
   bool see(const UncertainRigid3& pad_from_body, double gate);
-  // How much such a pose would surprise the speaker: its innovation squared.
+  // How much such a pose would surprise all of them together: its innovation squared.
   double surprise(const UncertainRigid3& pad_from_body) const;
   // A sample of the autopilot, each part gated for itself. After `patience` refusals in a row the world is
   // not what it was (the autopilot's heading was reset, say), and is met anew a second later: an autopilot
