@@ -306,7 +306,8 @@ FoundBoards Search::result() {
   });
   if (kept_.size() < result_.left_out.size()) {
     const std::string what = what_else(result_.left_out);
-    if (!what.empty()) result_.remarks.push_back(board_.text + ": not in most pictures" + what);
+    // A part of another board is found in a few, and calibrates to nonsense.
+    if (!what.empty()) throw std::runtime_error(board_.text + ": not in most pictures" + what);
   }
   leave_out_sizes();
   leave_out_blurred();

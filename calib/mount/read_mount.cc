@@ -3,6 +3,7 @@
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <utility>
@@ -132,7 +133,10 @@ ReadFlight read_mount_flight(const RunConfig& config, const std::filesystem::pat
   std::atomic<bool> stop = false;
   using StretchPtr = std::shared_ptr<Stretch>;
   tbb::parallel_pipeline(
-      2 * static_cast<size_t>(tbb::this_task_arena::max_concurrency()),
+      // A video's pictures are decoded in the first filter: 2 GB of them at a time.
+      std::clamp<size_t>((size_t{2} << 30) / (kStretch * static_cast<size_t>(camera.width()) *
+                                              static_cast<size_t>(camera.height())),
+                         1, 2 * static_cast<size_t>(tbb::this_task_arena::max_concurrency())),
       tbb::make_filter<void, StretchPtr>(tbb::filter_mode::serial_in_order,
                                          [&](tbb::flow_control& flow) -> StretchPtr {
                                            auto stretch = std::make_shared<Stretch>();

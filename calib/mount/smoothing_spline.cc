@@ -3,6 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "calib/mount/mount_solver.h"
 
 namespace perch {
 namespace {
@@ -79,7 +82,8 @@ SmoothingSpline::SmoothingSpline(std::vector<double> times, const std::vector<Ei
       break;
     }
   }
-  solve(best, samples);
+  if (!std::isfinite(solve(best, samples)))
+    throw MountError("navigation: no smooth curve goes through its samples");
 }
 
 // Fills in the nodes; returns -2 log of the likelihood a noise dimension, but for a constant.
@@ -120,6 +124,7 @@ double SmoothingSpline::solve(double density, const std::vector<Eigen::Vector4d>
       log_determinant += 3 * std::log(density);
     }
     row.S.compute(S);
+    if (row.S.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
     log_determinant += 2 * row.S.matrixLLT().diagonal().array().log().sum();
     if (i + 1 < n && joined(i)) row.back = row.S.solve(row.F.transpose() * row.W);
   }

@@ -1,5 +1,9 @@
 #include "calib/mount/trajectory.h"
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 namespace perch {
 namespace {
 
@@ -34,10 +38,29 @@ SmoothingSpline rotation_spline(const NavTrack& nav) {
   return {times(nav), quaternions, NavTrack::kMaxGap};
 }
 
+// Two samples almost at once tell of a rate what their noise makes of it, and nothing else; and the spline's
+// stiffness grows with the fifth power of their distance.
+NavTrack well_apart(NavTrack nav) {
+  std::vector<int64_t> steps;
+  for (size_t i = 1; i < nav.samples.size(); ++i)
+    steps.push_back(nav.samples[i].timestamp_ns - nav.samples[i - 1].timestamp_ns);
+  if (steps.empty()) return nav;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  const int64_t least = *middle / 10;
+  int64_t last = nav.samples.front().timestamp_ns - least - 1;
+  std::erase_if(nav.samples, [&](const NavSample& sample) {
+    if (sample.timestamp_ns - last < least) return true;
+    last = sample.timestamp_ns;
+    return false;
+  });
+  return nav;
+}
+
 }  // namespace
 
 Trajectory::Trajectory(NavTrack nav)
-    : nav_(std::move(nav)), position_(position_spline(nav_)), rotation_(rotation_spline(nav_)) {}
+    : nav_(well_apart(std::move(nav))), position_(position_spline(nav_)), rotation_(rotation_spline(nav_)) {}
 
 std::optional<TrajectoryPoint> Trajectory::at(int64_t navigation_ns) const {
   if (nav_.samples.empty()) return std::nullopt;

@@ -10,6 +10,8 @@ namespace {
 
 // From one end of the EVI-D30's pan to its middle, with what the line takes.
 constexpr int64_t kCentring = 2'000'000'000;
+// Without its angles for longer it is stopped; shorter gaps are those of a line that garbles.
+constexpr int64_t kBlind = 200'000'000;
 
 bool take(std::string_view& text, std::string_view prefix) {
   if (!text.starts_with(prefix)) return false;
@@ -93,8 +95,12 @@ void LiveHead::steer(int64_t now_ns, const std::optional<VehicleState>& state,
   if (!move) {
     doing_ = "blind";
     ++blind_;
+    // It would go on as it was told last, up to its stops.
+    if (blind_since_ns_ == 0) blind_since_ns_ = now_ns;
+    if (now_ns - blind_since_ns_ > kBlind) head.point({});
     return;
   }
+  blind_since_ns_ = 0;
   head.point(move->goal);
   doing_ = move->searching ? "searches" : "follows";
   ++(move->searching ? searching_ : moves_);

@@ -42,6 +42,7 @@ class LiveHead {
              const std::optional<HeadControl::Glimpse>& glimpse, PtzCamera& head);
   // To its zero, at the zoom of the start; then it follows again.
   void centre(int64_t now_ns, PtzCamera& head);
+  bool is_centring(int64_t now_ns) const { return now_ns < centring_until_ns_; }
   // What was told last.
   double zoom() const { return zoom_; }
 
@@ -58,6 +59,7 @@ class LiveHead {
   std::optional<ZoomControl> zoom_control_;
   double zoom_;
   int64_t centring_until_ns_ = 0;
+  int64_t blind_since_ns_ = 0;  // 0: it is not
   const char* doing_ = "rests";
   uint64_t moves_ = 0, searching_ = 0, blind_ = 0, zooms_ = 0;
 };

@@ -62,6 +62,7 @@ LiveLink::LiveLink(const LiveConfig& config, LiveLatency& latency, LinkTap tap, 
       feed_(config.run.frames.time_offset),
       watch_(config.run.tracking.coast) {
   if (config.ptz && config.ptz->gimbal) {
+    follows_ = config.ptz->follow;
     steering_.emplace(*config.ptz, config.run, frames, camera, mavlink::GimbalOptions{}.head);
     link_.listen([this](const mavlink::Frame& frame) { hear_for_gimbal(frame); });
   }
@@ -72,7 +73,7 @@ LiveLink::~LiveLink() {
   if (steering_) {  // or it would turn on
     {
       const std::lock_guard lock(mutex_);
-      if (gimbal_) gimbal_->point({});
+      if (gimbal_ && follows_) gimbal_->point({});
     }
     std::this_thread::sleep_for(100ms);
   }
@@ -150,6 +151,8 @@ void LiveLink::tell_gimbal(int64_t now_ns) {
     options.our_component = link_.component();
     gimbal_.emplace(options, link_.history());
   }
+  // One that is not to be moved is left to whoever moves it.
+  if (!sends_ || !(follows_ || steering_->is_centring(now_ns))) return;
   const auto out = gimbal_->tick(now_ns);
   if (out.command) send(link_.frame_of(*out.command), now_ns);
   if (out.set) send(link_.frame_of(*out.set), now_ns);

@@ -92,6 +92,7 @@ class LiveLink {
   LiveLatency& latency_;
   const LinkTap tap_;
   const bool sends_;
+  bool follows_ = false;  // with the gimbal
   const FrameChain frames_;
   const int64_t time_offset_ns_;
   ByteStream stream_;

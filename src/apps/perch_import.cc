@@ -272,7 +272,8 @@ int run(const CommandLine& line) {
   } else if (bag && (bag->has_poses() || inputs.pictures() != inputs.bag)) {
     import_navigation(inputs, bag->navigation(), config, folder, facts);
   }
-  write_whole_file(folder.path() / "import.json", facts.dump(2) + "\n");
+  write_whole_file(folder.path() / "import.json",
+                   facts.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   stop_if_asked();
   folder.finish();
   std::cout << FLAGS_output << ": a flight\n";

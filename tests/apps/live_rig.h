@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -90,7 +91,7 @@ class PerchLive : public testing::Test {
   TempFolder folder_;
   RealTimeAutopilot autopilot_;
   std::unique_ptr<SimulatedFlight> flight_;
-  int64_t begin_ns_ = 0;
+  std::atomic<int64_t> begin_ns_ = 0;
 };
 
 }  // namespace perch

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace perch {
 namespace {
@@ -81,6 +82,10 @@ TargetLook TargetViewer::look(const cv::Mat& grey, const CameraModel& camera,
   TargetLook look;
   look.white = median(white);
   look.black = median(black);
+  if (!seen.empty() && (white.empty() || black.empty())) {  // of one colour alone nobody knows which it is
+    look.visible = std::numeric_limits<double>::quiet_NaN();
+    return look;
+  }
   const double middle = (look.white + look.black) / 2;
   size_t right = 0;
   for (const auto& [level, is_white] : seen) right += (level > middle) == is_white;

@@ -42,10 +42,14 @@ std::optional<Moment> touched(const Track& track) {
   double lowest = INFINITY;
   for (const Eigen::Vector3d& p : track.position) lowest = std::min(lowest, p.z());
   const double level = lowest + kTouching;
-  size_t i = track.position.size();
-  while (i > 0 && track.position[i - 1].z() <= level + kDescent) --i;
-  if (i == 0) return std::nullopt;
-  while (i < track.position.size() && track.position[i].z() > level) ++i;
+  // The first time: afterwards somebody may carry it.
+  bool high = false;
+  size_t i = 0;
+  for (; i < track.position.size(); ++i) {
+    const double height = track.position[i].z();
+    if (height > level + kDescent) high = true;
+    if (high && height <= level) break;
+  }
   if (i == track.position.size()) return std::nullopt;
   const Eigen::Vector3d above = track.position[i - 1], below = track.position[i];
   const double part = (above.z() - level) / (above.z() - below.z());

@@ -156,7 +156,9 @@ class DataflashParser {
       kind.labels.emplace_back(labels.substr(0, comma));
       labels.remove_prefix(std::min(comma + 1, labels.size()));
     }
-    if (kind.length < kHeader || (kinds_[id].length > 0 && kinds_[id].name != kind.name)) return;
+    const bool other = kinds_[id].length > 0 && kinds_[id].name != kind.name;
+    if (kind.length < kHeader || other || !kinds_[id].fields.empty())
+      return;  // what is known and sound stays
     const bool wanted = std::find(wanted_.begin(), wanted_.end(), kind.name) != wanted_.end();
     if (kind.fields.size() != format.size() || length != kind.length) {
       if (wanted) {

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <fstream>
+#include <new>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <set>
 #include <stdexcept>
 
 #include "perch/camera/camera_model.h"
@@ -244,6 +246,7 @@ void RosBag::write_pictures(const fs::path& cam0, std::vector<std::string>& prob
   fs::create_directories(cam0 / "data");
   std::string rows = "#timestamp [ns],filename\n";
   size_t written = 0, skipped = 0;
+  std::set<int64_t> times;
   std::string first_why;
   rosbag::View view(topics_->bag, rosbag::TopicQuery(topics_->pictures));
   size_t seen = 0;
@@ -255,7 +258,9 @@ void RosBag::write_pictures(const fs::path& cam0, std::vector<std::string>& prob
       if (const auto compressed = m.instantiate<ros1::CompressedImage>()) {
         time = stamp_ns(*compressed, m);
         const std::string extension = extension_of(compressed->data);
-        if (extension.empty()) {
+        if (times.contains(time)) {
+          why = "its time is that of a picture before";
+        } else if (extension.empty()) {
           why = "format \"" + text_of(compressed->format) + "\" is neither JPEG nor PNG";
         } else {
           name = std::to_string(time) + extension;
@@ -264,7 +269,9 @@ void RosBag::write_pictures(const fs::path& cam0, std::vector<std::string>& prob
       } else if (const auto image = m.instantiate<ros1::Image>()) {
         time = stamp_ns(*image, m);
         const cv::Mat picture = picture_of(*image, why);
-        if (!picture.empty()) {
+        if (times.contains(time)) {
+          why = "its time is that of a picture before";
+        } else if (!picture.empty()) {
           name = std::to_string(time) + ".png";
           // Noise does not compress: the fastest level costs 3 % of space.
           if (!cv::imwrite((cam0 / "data" / name).string(), picture, {cv::IMWRITE_PNG_COMPRESSION, 1}))
@@ -275,12 +282,17 @@ void RosBag::write_pictures(const fs::path& cam0, std::vector<std::string>& prob
       why = e.what();
     } catch (const ros::Exception& e) {
       why = e.what();
+    } catch (const std::bad_alloc&) {  // a length that is broken
+      why = "its length is wrong";
+    } catch (const std::length_error&) {
+      why = "its length is wrong";
     }
     if (name.empty()) {
       ++skipped;
       if (first_why.empty()) first_why = why;
       continue;
     }
+    times.insert(time);
     rows += std::to_string(time) + "," + name + "\n";
     ++written;
   }

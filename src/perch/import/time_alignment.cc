@@ -297,6 +297,9 @@ double correlation(const Series& a, const Series& b, std::ptrdiff_t lag, size_t 
 
 std::vector<double> Alignment::hills() const {
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  constexpr double kLongest = 3 * 86'400;  // s
+  if (body_.end() - body_.begin() > kLongest || windows_.back().begin - windows_.front().begin > kLongest)
+    throw AlignmentError("times span more than three days: a clock was set amid the recording");
   const double width = windows_.front().end - windows_.front().begin;
   Series camera{windows_.front().begin, {}}, body{body_.begin(), {}};
   // Each window's magnitude where its middle is; the last one counts where there are several.

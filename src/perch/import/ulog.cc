@@ -244,7 +244,9 @@ class UlogParser {
         // No message is longer than this; nested arrays of arrays would be.
         if (layout.size > 65535) return false;
         if (basic == std::end(kBasicTypes)) {
+          const size_t before = layout.size;
           if (!lay_out(field.type, depth + 1, layout, nullptr)) return false;
+          if (layout.size == before) break;  // nothing is in it, however many there are
           continue;
         }
         if (names) {

@@ -270,10 +270,13 @@ std::optional<int64_t> VehicleLink::halfway() const {
   return exchange_->sent_ns + exchange_->round_trip_ns() / 2;
 }
 
-std::optional<int64_t> VehicleLink::plausible(std::optional<int64_t> time_ns, int64_t arrival_ns) {
+std::optional<int64_t> VehicleLink::plausible(std::optional<int64_t> time_ns, int64_t arrival_ns,
+                                              bool stamped) {
   const bool unknown = !time_ns || clock_.doubtful();
   if (!unknown && *time_ns <= arrival_ns + kAhead && *time_ns >= arrival_ns - kBehind) return time_ns;
-  if (const auto middle_ns = halfway()) {
+  // One that a clock we know says is old is old, however quickly it came.
+  const auto middle_ns = unknown || !stamped ? halfway() : std::nullopt;
+  if (middle_ns) {
     ++statistics_.times_by_round_trip;
     return middle_ns;
   }
@@ -285,6 +288,17 @@ template <class Message>
 void VehicleLink::handle_sample(const Frame& frame, int64_t arrival_ns) {
   const Message message = *decode<Message>(frame);
   std::optional<int64_t> time_ns;
+  bool stamped = true;
+  if constexpr (requires { message.time_boot_ms; }) {
+    stamped = message.time_boot_ms != 0;
+    // An autopilot that is asked, and answers with what it said before, has nothing new.
+    uint32_t& last = last_stamps_[frame.id()];
+    if (options_.ask_each && stamped && message.time_boot_ms == last) {
+      ++statistics_.times_implausible;
+      return;
+    }
+    last = message.time_boot_ms;
+  }
   if (frame.component != mav_component::kAutopilot) {
     time_ns = arrival_ns;  // it has a clock of its own, which is not matched
   } else if constexpr (requires { message.time_boot_ms; }) {
@@ -294,7 +308,7 @@ void VehicleLink::handle_sample(const Frame& frame, int64_t arrival_ns) {
     time_ns =
         clock_.local_from_remote(static_cast<int64_t>(std::min(message.time_usec, kMost) * 1000), arrival_ns);
   }
-  time_ns = plausible(time_ns, arrival_ns);
+  time_ns = plausible(time_ns, arrival_ns, stamped);
   if (time_ns && !history_.add(message, *time_ns)) ++statistics_.samples_refused;
 }
 

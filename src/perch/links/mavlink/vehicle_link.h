@@ -136,7 +136,7 @@ class VehicleLink {
   template <class Message>
   void handle_sample(const Frame& frame, int64_t arrival_ns);
   // A time of the autopilot's clock on ours; empty, and counted, when it cannot be right.
-  std::optional<int64_t> plausible(std::optional<int64_t> time_ns, int64_t arrival_ns);
+  std::optional<int64_t> plausible(std::optional<int64_t> time_ns, int64_t arrival_ns, bool stamped = true);
   std::optional<int64_t> halfway() const;
   bool comes_again(uint8_t sequence);
   void come_up(const Heartbeat& heartbeat, uint8_t system);
@@ -165,7 +165,8 @@ class VehicleLink {
   std::optional<MessageExchange> exchange_;  // that brought the message which is being handled
   std::optional<uint8_t> last_sequence_;     // of the autopilot's frames
   int recent_in_a_row_ = 0;
-  uint32_t last_boot_ms_ = 0;  // of SYSTEM_TIME
+  uint32_t last_boot_ms_ = 0;                 // of SYSTEM_TIME
+  std::map<uint32_t, uint32_t> last_stamps_;  // time_boot_ms of the last sample, by message
   ParameterReader parameters_;
   std::deque<VehicleText> texts_;
   std::optional<int64_t> unix_minus_monotonic_ns_;

@@ -32,6 +32,7 @@ constexpr int64_t kFixLost = 3 * kSecond;
 // A heading of its own sentence stands in for one that an attitude lacks; at 30 deg/s it is off by 6 deg
 // then.
 constexpr int64_t kHeadingGood = 200 * kMs;
+constexpr double kUsualTurn = 0.5;  // rad/s
 // Between attitudes further apart no rate can be told.
 constexpr int64_t kRateWithin = 200 * kMs;
 constexpr size_t kMostWaiting = 100;
@@ -104,6 +105,7 @@ std::optional<int64_t> Receiver::time_of(int64_t of_day_ns, int64_t arrival_ns) 
     fixes_.forget();
     attitudes_.forget();
     pending_.clear();
+    said_.clear();
     last_.reset();
     last_velocity_.reset();
     velocity_.reset();
@@ -132,9 +134,8 @@ void Receiver::handle(const Gga& message, int64_t arrival_ns) {
   const bool follows = fixes_.take(fix, [&](const Fix& a, const Fix& b) {
     const double dt = seconds(b.time_ns - a.time_ns);
     const Vector3d way = LocalFrame(a.place).ned(b.place);
-    if (!last_ || last_->time_ns != a.time_ns || !last_velocity_)
-      return dt > 0 && way.norm() < kMostJump + kMostSpeed * dt;
-    return (way - *last_velocity_ * dt).norm() < kMostNoise + kMostAcceleration / 2 * dt * dt;
+    if (!last_ || last_->time_ns != a.time_ns) return dt > 0 && way.norm() < kMostJump + kMostSpeed * dt;
+    return is_flown(way, dt);
   });
   if (!follows) {
     ++statistics_.jumps_refused;
@@ -146,6 +147,12 @@ void Receiver::handle(const Gga& message, int64_t arrival_ns) {
   add_fix(fix);
 }
 
+// From the last fix on.
+bool Receiver::is_flown(const Vector3d& way, double dt) const {
+  if (!last_velocity_) return dt > 0 && way.norm() < kMostJump + kMostSpeed * dt;
+  return (way - *last_velocity_ * dt).norm() < kMostNoise + kMostAcceleration / 2 * dt * dt;
+}
+
 void Receiver::add_fix(const Fix& fix) {
   ++statistics_.fixes;
   fix_rate_.count(fix.arrival_ns);
@@ -155,9 +162,12 @@ void Receiver::add_fix(const Fix& fix) {
   pending.arrival_ns = fix.arrival_ns;
   pending.fix.time_ns = fix.time_ns;
   pending.fix.body_in_ned = frame_->ned(fix.place);
-  if (last_ && fix.time_ns - last_->time_ns < kUsual) {
+  // A jump, though others confirmed it, is no way that was flown.
+  if (last_ && fix.time_ns - last_->time_ns < kUsual &&
+      is_flown(pending.fix.body_in_ned - last_->body_in_ned, seconds(fix.time_ns - last_->time_ns))) {
     pending.fix.body_velocity_in_ned =
         (pending.fix.body_in_ned - last_->body_in_ned) / seconds(fix.time_ns - last_->time_ns);
+    pending.by_positions = true;
     last_velocity_ = pending.fix.body_velocity_in_ned;
   } else {
     last_velocity_.reset();
@@ -174,7 +184,8 @@ void Receiver::give_velocity(Pending& pending) {
   PositionFix& fix = pending.fix;
   if (!velocity_ || std::abs(velocity_->time_ns - fix.time_ns) > kSameMoment) return;
   pending.has_velocity = true;
-  if ((velocity_->north_east - fix.body_velocity_in_ned.head<2>()).norm() < kMostSpeedError)
+  if (!pending.by_positions ||
+      (velocity_->north_east - fix.body_velocity_in_ned.head<2>()).norm() < kMostSpeedError)
     fix.body_velocity_in_ned.head<2>() = velocity_->north_east;
   if (last_velocity_ && fix.time_ns == last_->time_ns) last_velocity_ = fix.body_velocity_in_ned;
 }
@@ -221,7 +232,11 @@ void Receiver::handle(const Attitude& message, int64_t arrival_ns) {
     return;
   }
   Vector3d rate = Vector3d::Zero();
-  if (before && now.time_ns - before->time_ns <= kRateWithin) {
+  // A heading that is new since would turn by all it had gathered.
+  const bool stood_in = !message.heading;
+  const bool same_heading = !stood_in || heading_ns_ == stood_in_ns_;
+  if (stood_in) stood_in_ns_ = heading_ns_;
+  if (before && same_heading && now.time_ns - before->time_ns <= kRateWithin) {
     rate = so3_log(before->ned_from_body.conjugate() * now.ned_from_body) /
            seconds(now.time_ns - before->time_ns);
   }
@@ -235,6 +250,8 @@ void Receiver::handle(const Attitude& message, int64_t arrival_ns) {
   sample.world_from_body = now.ned_from_body;
   sample.attitude_sigma =
       std::max(message.of_day_ns ? kAttitudeSigma : kUntimedSigma, message.sigma.value_or(0));
+  if (stood_in)
+    sample.attitude_sigma = std::hypot(sample.attitude_sigma, kUsualTurn * seconds(arrival_ns - heading_ns_));
   said_.push_back(sample);
 }
 

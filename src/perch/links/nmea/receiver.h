@@ -90,6 +90,7 @@ class Receiver {
     PositionFix fix;
     int64_t arrival_ns = 0;
     bool has_velocity = false;
+    bool by_positions = false;  // its velocity is that since the fix before
   };
   class Rate {
    public:
@@ -108,6 +109,7 @@ class Receiver {
   void handle(const TrueHeading& message, int64_t arrival_ns);
   void handle(const Attitude& message, int64_t arrival_ns);
   std::optional<int64_t> time_of(int64_t of_day_ns, int64_t arrival_ns);
+  bool is_flown(const Eigen::Vector3d& way, double dt) const;
   void add_fix(const Fix& fix);
   void give_velocity(Pending& pending);
   bool complete(const Pending& pending, int64_t now_ns) const;
@@ -125,8 +127,8 @@ class Receiver {
   std::optional<Eigen::Vector3d> last_velocity_;  // there, where it is known
   std::vector<AutopilotSample> said_;
   int64_t last_said_ns_ = 0;
-  std::optional<double> heading_;  // of HDT
-  int64_t heading_ns_ = 0;
+  std::optional<double> heading_;             // of HDT
+  int64_t heading_ns_ = 0, stood_in_ns_ = 0;  // of the last; of the last that stood in for an attitude's
   struct Velocity {
     int64_t time_ns = 0, arrival_ns = 0;
     Eigen::Vector2d north_east = Eigen::Vector2d::Zero();  // m/s

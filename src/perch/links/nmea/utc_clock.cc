@@ -18,6 +18,8 @@ constexpr size_t kMostSamples = 9000;
 constexpr int64_t kEarly = 50 * kMs;
 // What is a second old when it comes is of no use.
 constexpr int64_t kLate = kSecond;
+// A line that was cut and catches up is late for so long at most; a clock that was set stays so.
+constexpr int64_t kCatchesUp = 10 * kSecond;
 // Those that mean the same step agree within what queues do to them.
 constexpr int64_t kAgree = 500 * kMs;
 
@@ -43,6 +45,10 @@ bool UtcClock::take(int64_t of_day_ns, int64_t arrival_ns) {
   if (!std::all_of(contradicting_.begin(), contradicting_.end(), agrees)) contradicting_.clear();
   contradicting_.push_back(sample);
   if (contradicting_.size() < kEnough) return false;
+  if (later > kLate && arrival_ns - contradicting_.front().arrival_ns < kCatchesUp) {
+    if (contradicting_.size() > kEnough) contradicting_.erase(contradicting_.begin() + 1);
+    return false;
+  }
   samples_.clear();
   ++steps_;
   for (const Sample& s : contradicting_) {

@@ -90,6 +90,7 @@ void ViscaCamera::point(const HeadGoal& goal) {
 }
 
 void ViscaCamera::zoom_to(double zoom) {
+  zooms_retold_ = 0;
   if (std::isfinite(zoom)) zoom_told_ = zoom_goal_ = std::clamp(zoom, 0.0, 1.0);
 }
 
@@ -216,8 +217,13 @@ void ViscaCamera::take_zoom(std::span<const uint8_t> payload) {
   zoom_suspect_ = zoom;
   if (agrees) zoom_ = zoom;
   // It stands elsewhere than it was told to: its command was lost, or cancelled for another's sake.
-  if (agrees && zoom_told_ && !zoom_goal_ && std::abs(*zoom_told_ - zoom) >= kZoomAgrees)
+  // Told so often in vain it cannot, or somebody else zooms.
+  constexpr int kMostRetold = 3;
+  if (agrees && zoom_told_ && !zoom_goal_ && zooms_retold_ < kMostRetold &&
+      std::abs(*zoom_told_ - zoom) >= kZoomAgrees) {
     zoom_goal_ = zoom_told_;
+    ++zooms_retold_;
+  }
   // Somebody zooms, or the line garbled: nobody knows until two agree again.
   if (zoom_ && std::abs(*zoom_ - zoom) >= kZoomAgrees) zoom_.reset();
 }

@@ -126,6 +126,7 @@ class ViscaCamera : public PtzCamera {
   std::array<Socket, 3> sockets_{};  // from 1
   std::optional<HeadGoal> goal_;     // to be sent
   std::optional<double> zoom_goal_, zoom_told_;
+  int zooms_retold_ = 0;
   std::optional<DriveSteps> driving_;  // what the device acknowledged last
   static constexpr int64_t kGarblesFor = 10'000'000'000;
   int64_t garbles_until_ns_ = 0;
