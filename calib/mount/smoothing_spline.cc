@@ -47,6 +47,8 @@ Quintic quintic(double u, double d) {
   return q;
 }
 
+}  // namespace
+
 double median_step(const std::vector<double>& times) {
   std::vector<double> steps;
   for (size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
@@ -55,8 +57,6 @@ double median_step(const std::vector<double>& times) {
   std::nth_element(steps.begin(), middle, steps.end());
   return *middle;
 }
-
-}  // namespace
 
 SmoothingSpline::SmoothingSpline(std::vector<double> times, const std::vector<Eigen::Vector4d>& samples,
                                  double longest_gap)

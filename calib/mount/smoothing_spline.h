@@ -6,6 +6,9 @@
 
 namespace perch {
 
+// Of ascending times; 1 of fewer than two.
+double median_step(const std::vector<double>& times);
+
 // A motion on up to four axes, freed from the white noise of its samples:
 //
 //   x''' is white noise of density q,   y_i = x(t_i) + n_i,   n_i ~ N(0, sigma^2)
