@@ -143,7 +143,7 @@ std::vector<BoardCorner> SquaresFinder::measure(const cv::Mat& grey, const Camer
   const std::vector<uint8_t> on_ground(pieces_.size(), 0);
   double blur = 0.8;
   for (int round = 0; round < 2; ++round) {
-    edge_fit_.measure(grey, pieces_, on_ground, plane.frame, {64, blur, 12, round > 0}, offsets_, measured_);
+    edge_fit_.measure(grey, pieces_, on_ground, plane.frame, {64, blur, 12}, offsets_, measured_);
     blur = std::clamp(std::sqrt(0.5 * edge_fit_.blur().trace()), 0.45, 3.0);
   }
   // Where along their edges the pieces are, by the target's plane.

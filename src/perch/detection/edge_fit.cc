@@ -11,7 +11,7 @@ namespace perch {
 namespace {
 
 // As many deviations of the blur from a step its levels are looked for: it ends after three.
-constexpr double kLevel = 4.5;
+constexpr double kLevel = 4.2;
 
 // Of the pixels' products with the templates: how many each line has.
 constexpr int kNarrow = 8;
@@ -198,7 +198,7 @@ Step solve(const EdgeFit::Piece& piece, const LevelSurface::Level& white, const 
 EdgeFit::EdgeFit() = default;
 EdgeFit::~EdgeFit() = default;
 
-bool EdgeFit::fit(const cv::Mat& grey, const EdgePiece& piece, const FitOptions& options,
+bool EdgeFit::fit(const cv::Mat& grey, const EdgePiece& piece, const EdgeFitOptions& options,
                   Piece& fitted) const {
   const double cosine = piece.normal.cwiseAbs().maxCoeff(), sine = piece.normal.cwiseAbs().minCoeff();
   // Up to where the next edge's blur begins, and not farther than the step's own reaches.
@@ -286,8 +286,9 @@ void EdgeFit::widen_on_ground(std::span<const uint8_t> on_ground) {
 }
 
 void EdgeFit::measure(const cv::Mat& grey, std::span<const EdgePiece> pieces,
-                      std::span<const uint8_t> on_ground, const ImageFrame& frame, const FitOptions& options,
-                      std::vector<EdgeOffset>& offsets, std::vector<int>& pieces_measured) {
+                      std::span<const uint8_t> on_ground, const ImageFrame& frame,
+                      const EdgeFitOptions& options, std::vector<EdgeOffset>& offsets,
+                      std::vector<int>& pieces_measured) {
   offsets.clear();
   pieces_measured.clear();
   fitted_.clear();
@@ -297,17 +298,14 @@ void EdgeFit::measure(const cv::Mat& grey, std::span<const EdgePiece> pieces,
     if (fit(grey, pieces[i], options, fitted)) fitted_.push_back(fitted);
   }
   find_blur(pieces, options.blur);
-  if (options.share_levels) find_levels(pieces, on_ground);
+  find_levels(pieces, on_ground);
   widen_on_ground(on_ground);
   for (const Piece& p : fitted_) {
     const EdgePiece& piece = pieces[static_cast<size_t>(p.index)];
-    LevelSurface::Level white, black;
-    if (options.share_levels) {
-      white = believed(p, white_, piece.middle, 0.5 * p.sign());
-      // Of the ground nothing is known.
-      const bool of_ground = on_ground[static_cast<size_t>(p.index)] != 0;
-      if (!of_ground) black = believed(p, black_, piece.middle, -0.5 * p.sign());
-    }
+    const LevelSurface::Level white = believed(p, white_, piece.middle, 0.5 * p.sign());
+    // Of the ground nothing is known.
+    LevelSurface::Level black;
+    if (!on_ground[static_cast<size_t>(p.index)]) black = believed(p, black_, piece.middle, -0.5 * p.sign());
     const Step step = solve(p, white, black);
     if (!(std::abs(step.offset) < 0.5) || !std::isfinite(step.sigma)) continue;
     EdgeOffset offset;

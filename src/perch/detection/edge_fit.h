@@ -13,11 +13,10 @@
 
 namespace perch {
 
-struct FitOptions {
+struct EdgeFitOptions {
   int lines_per_edge = 64;
-  double blur = 0.8;         // of the picture across edges, the pixel's own included, px
-  double contrast = 12;      // of a step, at least; grey levels
-  bool share_levels = true;  // with a blur that is known only roughly each piece finds its own
+  double blur = 0.8;     // of the picture across edges, the pixel's own included, px
+  double contrast = 12;  // of a step, at least; grey levels
 };
 
 // Measures pieces of edges to a few hundredths of a pixel: the lines across a piece, each at its own
@@ -37,7 +36,7 @@ class EdgeFit {
   // whose step has the wrong sense, is too low, or ran away gives no offset. `pieces_measured` are the
   // indices of those that did.
   void measure(const cv::Mat& grey, std::span<const EdgePiece> pieces, std::span<const uint8_t> on_ground,
-               const ImageFrame& frame, const FitOptions& options, std::vector<EdgeOffset>& offsets,
+               const ImageFrame& frame, const EdgeFitOptions& options, std::vector<EdgeOffset>& offsets,
                std::vector<int>& pieces_measured);
 
   const Eigen::Matrix2d& blur() const { return blur_; }  // as in edge_blur.h
@@ -45,7 +44,7 @@ class EdgeFit {
   struct Piece;
 
  private:
-  bool fit(const cv::Mat& grey, const EdgePiece& piece, const FitOptions& options, Piece& fitted) const;
+  bool fit(const cv::Mat& grey, const EdgePiece& piece, const EdgeFitOptions& options, Piece& fitted) const;
   void find_levels(std::span<const EdgePiece> pieces, std::span<const uint8_t> on_ground);
   void widen_on_ground(std::span<const uint8_t> on_ground);
   void find_blur(std::span<const EdgePiece> pieces, double expected_px);

@@ -46,7 +46,7 @@ void project_edges(const TargetEdges& target, const Eigen::Matrix3d& image_from_
     // An end that the lens cannot show: its edge is cut by the picture's edge and seen in pieces.
     const double length = from && to ? (to->pixel - from->pixel).norm() : 8 * std::min(longest, 100.0);
     int count = static_cast<int>(std::ceil(length / longest));
-    if (length > 16 && longest < kWhole) count = std::max(count, 2);
+    if (length > 24 && longest < kWhole) count = std::max(count, 2);
     count = std::clamp(count, 1, 12);
     std::optional<Seen> begin = from;
     for (int k = 0; k < count; ++k) {

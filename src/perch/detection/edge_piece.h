@@ -34,7 +34,7 @@ Eigen::Matrix3d towards_camera(const Eigen::Matrix3d& image_from_plane);
 inline constexpr double kWhole = 1e9;
 
 // All edges of which something is in view, cut into pieces of at most `longest` px, and into two at least
-// where that leaves eight px of each, unless they are to be whole. Replaces `pieces`.
+// where that leaves twelve px of each, unless they are to be whole. Replaces `pieces`.
 void project_edges(const TargetEdges& target, const Eigen::Matrix3d& image_from_plane,
                    const CameraModel& camera, double longest, std::vector<EdgePiece>& pieces);
 

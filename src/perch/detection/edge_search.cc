@@ -41,7 +41,11 @@ std::optional<Step> steepest(const Line& line, int n, int sign, int levels) {
   step.slope = 0.5 * most;
   if (std::abs(best) < n - 1) {
     const double before = slope(best - 1), after = slope(best + 1), bend = 2 * most - before - after;
-    if (bend > 0) step.at += std::clamp(0.5 * (after - before) / bend, -0.5, 0.5);
+    if (bend > 0) {
+      const double off = std::clamp(0.5 * (after - before) / bend, -0.5, 0.5);
+      step.at += off;
+      step.slope += 0.22 * (after - before) * off;
+    }
   }
   // The levels on both sides: as far as the grey goes on rising.
   int low = best - 1, high = best + 1;
@@ -49,6 +53,14 @@ std::optional<Step> steepest(const Line& line, int n, int sign, int levels) {
   while (high < n && high < best + 4 && sign * (line[high + 1] - line[high]) > 0) ++high;
   step.contrast = sign * (line[high] - line[low]);
   return step;
+}
+
+// The blur's deviation, of a Gaussian's greatest slope. That is of the difference over two pixels, which is
+// blurred by as many more.
+double width_of(const Step& step) {
+  constexpr double kSlope = 0.3989, kTwoPixels = 1.0 / 3, kLeast = 0.2;  // the latter px^2
+  const double width = kSlope * step.contrast / std::max(step.slope, 1.0);
+  return std::sqrt(std::max(width * width - kTwoPixels, kLeast));
 }
 
 }  // namespace
@@ -91,8 +103,7 @@ void search_edges(const cv::Mat& grey, std::span<const EdgePiece> pieces, const 
       offset.sigma = 0.2;
       offset.white = -1;
       offsets.push_back(offset);
-      steps.push_back(
-          {piece.edge, step->contrast, 0.4 * step->contrast / std::max(step->slope, 1.0) * cosine});
+      steps.push_back({piece.edge, step->contrast, width_of(*step) * cosine});
     }
   }
 }

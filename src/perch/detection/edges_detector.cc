@@ -50,8 +50,15 @@ constexpr double kExplained = 0.85;
 // A piece of an edge for the fine fit: an arc over this length is a parabola to a hundredth of a pixel.
 constexpr double kPiece = 32;  // px
 
-// As many whole edges tell a homography, some of them covered.
-constexpr size_t kEnoughEdges = 24;
+// A first look at the edges is the last where it moves none of them by more than this, finds the blur that
+// was expected, to a part of it, and of the pieces at least this part.
+constexpr double kStill = 0.1;  // px
+constexpr double kSameBlur = 0.15, kMostPieces = 0.9;
+constexpr int kMostLooks = 3;
+
+// How far a fit to a blurred step is off one bent by the sensor's response differs by its reach: by this part
+// of the growth.
+constexpr double kBent = 0.1;
 
 // No lens is sharper, its pixels included; what seems to be is drawn without a lens.
 constexpr double kSharpest = 0.45;  // px
@@ -131,6 +138,7 @@ struct EdgesDetector::Work {
   void search_means(const cv::Mat& grey, RegionSearch& search_regions, Stopwatch& stopwatch);
   std::optional<Confirmed> follow(const cv::Mat& grey, const Prediction& prediction);
   bool is_outline(const EdgePiece& piece) const;
+  double smallest_square_px(const Confirmed& found) const;
   void share_growth();
   std::optional<PlaneMeasurement> measure_edges(const cv::Mat& grey, const Confirmed& found);
   std::optional<PlaneMeasurement> measure_picture(const cv::Mat& grey, const Confirmed& found);
@@ -151,6 +159,12 @@ EdgesDetector::EdgesDetector(const LandingTarget& target, const CameraModel& cam
 }
 
 EdgesDetector::~EdgesDetector() = default;
+
+double EdgesDetector::Work::smallest_square_px(const Confirmed& found) const {
+  double smallest = target.size;
+  for (const TargetShape& shape : edges.shapes) smallest = std::min(smallest, shape.side);
+  return 2 * found.frame.radius * camera.intrinsics()[0] * smallest / target.size;
+}
 
 std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const Prediction& prediction) {
   const auto& [mean, covariance] = prediction.camera_from_target;
@@ -173,6 +187,8 @@ std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const 
     squares += edges.shapes[i].kind == ShapeKind::kSquare && found->seen[i];
   }
   if (squares < kLeastSquares) return std::nullopt;
+  // Small ones have no room beside them in which another panel's would show.
+  if (smallest_square_px(*found) < kSmallSquare) return std::nullopt;
   // Turned in itself by a quarter, the target still shows all of its border and half of its squares.
   for (int quarters = 1; quarters < 4; ++quarters) {
     const Eigen::Matrix3d turned(Eigen::AngleAxisd(quarters * M_PI / 2, Eigen::Vector3d::UnitZ()));
@@ -268,33 +284,35 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
   PlaneMeasurement plane;
   Eigen::Matrix3d H = found.image_from_plane;
   PlaneFit fit;
-  FitOptions how{(options.lines_per_edge + 3) / 4, found.blur, options.min_contrast, false};
-  const auto look = [&](double longest, int lines) {
-    project_edges(edges, H, camera, longest, pieces);
+  EdgeFitOptions how{options.lines_per_edge, found.blur, options.min_contrast};
+  double bent = 0;
+  const auto fit_widened = [&](double by) {
+    for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, by);
+    fit = fit_plane(offsets, plane.frame, 0.3, 3);
+  };
+  bool is_settled = false;
+  for (int look = 1; !is_settled && look <= kMostLooks; ++look) {
+    plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
+    project_edges(edges, H, camera, kPiece, pieces);
     on_ground.clear();
     for (const EdgePiece& piece : pieces) on_ground.push_back(is_outline(piece));
-    FitOptions with = how;
-    with.lines_per_edge = lines;
-    edge_fit.measure(grey, pieces, on_ground, plane.frame, with, offsets, measured);
-  };
-  // The first round finds the blur and what is left to a tenth of a pixel, of few lines; the next all of it.
-  constexpr int kMostRounds = 3;
-  for (int round = 0; round < kMostRounds; ++round) {
-    plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
-    // Where enough of them are measured, whole edges will do for the first round.
-    if (round == 0) look(kWhole, 2 * how.lines_per_edge);
-    if (round > 0 || offsets.size() < kEnoughEdges) look(kPiece, how.lines_per_edge);
+    edge_fit.measure(grey, pieces, on_ground, plane.frame, how, offsets, measured);
     if (offsets.size() < 10) return std::nullopt;
     share_growth();
-    // What a fit to a blurred step makes of one bent by the sensor's response differs by its reach.
-    const double bent = 0.1 * fit.growth;
-    for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, options.systematic_px, bent);
-    fit = fit_plane(offsets, plane.frame, 0.3, round == 0 ? 2 : 3);
+    fit_widened(std::hypot(options.systematic_px, bent));
+    const double now_bent = kBent * std::abs(fit.growth);
+    if (now_bent > bent + options.systematic_px) fit_widened(std::sqrt(now_bent * now_bent - bent * bent));
+    bent = now_bent;
     H = towards_camera(corrected(H, plane.frame, fit.step));
-    // What is left of half a tenth of a pixel after one step is nothing.
-    if (round > 0 && fit.step.norm() * plane.frame.radius * camera.intrinsics()[0] < 0.15) break;
     const double blur = std::max(std::sqrt(0.5 * edge_fit.blur().trace()), kSharpest);
-    how = {options.lines_per_edge, blur, options.min_contrast};
+    const bool as_expected =
+        std::abs(blur - how.blur) < kSameBlur * blur &&
+        static_cast<double>(measured.size()) >= kMostPieces * static_cast<double>(pieces.size());
+    const double moved = fit.step.norm() * plane.frame.radius * camera.intrinsics()[0];
+    is_settled = moved < kStill && (look > 1 || as_expected);
+    // What goes on moving is no target.
+    if (look == kMostLooks && moved > 0.5 * blur) return std::nullopt;
+    how.blur = blur;
   }
   plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
   plane.image_from_plane = H;
@@ -331,11 +349,8 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_picture(const cv::M
 }
 
 bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
-  double smallest = target.size;
-  for (const TargetShape& shape : edges.shapes) smallest = std::min(smallest, shape.side);
-  const double smallest_px = 2 * found.frame.radius * camera.intrinsics()[0] * smallest / target.size;
   std::optional<PlaneMeasurement> plane;
-  if (smallest_px < kSmallSquare) plane = measure_picture(grey, found);
+  if (smallest_square_px(found) < kSmallSquare) plane = measure_picture(grey, found);
   if (!plane) plane = measure_edges(grey, found);
   if (!plane) return false;
   detection.plane = plane;

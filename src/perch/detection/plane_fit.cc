@@ -187,8 +187,9 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
     sigma_outline = 0.0005 + 0.3 * (round == 0 ? sigma_growth : std::abs(x(8)));
     held(9, 9) += 1 / (sigma_outline * sigma_outline);
     held.diagonal() += Unknowns::Constant(1e-9 * held.trace());
-    x = held.ldlt().solve(M.topRightCorner<10, 1>().eval());
-    if (!x.allFinite()) {
+    const Eigen::LLT<Normal> llt(held);
+    x = llt.solve(M.topRightCorner<10, 1>().eval());
+    if (llt.info() != Eigen::Success || !x.allFinite()) {
       x.setZero();
       break;
     }

@@ -307,7 +307,7 @@ std::optional<PoseEstimator::Minimum> PoseEstimator::minimum_at(const WhitenedPl
   const double misfit = std::sqrt(minimum.cost / std::max(1, plane.measured.edges)) * plane.measured.sigma_px;
   minimum.rms_px = std::hypot(plane.measured.rms_px, misfit);
   minimum.rms_sigmas = options_.max_rms_sigmas * misfit / options_.max_misfit_px;
-  const PoseCovariance information = J.transpose() * J;
+  const PoseCovariance information = J.transpose().lazyProduct(J);
   const Eigen::LDLT<PoseCovariance> ldlt(information);
   auto& covariance = minimum.camera_from_target.covariance;
   covariance = minimum.variance * ldlt.solve(PoseCovariance::Identity());
