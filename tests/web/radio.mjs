@@ -56,10 +56,13 @@ export class Radio {
 
   // In turn from each connection, a packet at a time.
   #pass() {
+    // What time it is tells how much: on a machine that others load a tick may come late.
+    const now = performance.now(), ms = now - (this.passed ?? now);
+    this.passed = now;
     for (const direction of [0, 1]) {
       this.room ??= [0, 0];
-      const most = this.kbit ? this.kbit / 8 * TICK_MS : Infinity;
-      this.room[direction] = Math.min(this.room[direction] + most, 5 * most);
+      const rate = this.kbit / 8;  // bytes a ms
+      this.room[direction] = rate ? Math.min(this.room[direction] + rate * ms, rate * Math.max(5 * TICK_MS, ms)) : Infinity;
       const ways = [...this.#links].map((link) => link.ways[direction]);
       for (let moved = true; moved && this.room[direction] > 0;) {
         moved = false;
