@@ -124,9 +124,14 @@ TEST_F(Recording, OfAVideoOnAFullDiskKeepsFramesAndRowsTogether) {
     r->add_frame(frames.back(), aid(i), estimate(i));
     std::this_thread::sleep_for(std::chrono::microseconds(rng.bits() % 1000));
   }
-  disk_->full = false;
+  // And for as long as it takes, once.
+  disk_->full = true;
   frames.push_back(frame(30));
   r->add_frame(frames.back(), aid(30), estimate(30));
+  wait_until([&] { return r->counters().frames_dropped > 0; });
+  disk_->full = false;
+  frames.push_back(frame(31));
+  r->add_frame(frames.back(), aid(31), estimate(31));
   r->close();
   EXPECT_GT(r->counters().frames_dropped, 0);
   const Recorded recorded(r->folder());

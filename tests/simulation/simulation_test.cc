@@ -8,6 +8,7 @@
 
 #include "perch/simulation/flight_folder.h"
 #include "support/near_pose.h"
+#include "support/temp_folder.h"
 
 namespace perch {
 namespace {
@@ -18,16 +19,11 @@ using testing::HasSubstr;
 // A folder of its own for each test, with a target in it.
 class SimulationFiles : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              (std::string("perch_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    std::ofstream(folder_ / "sharp.yaml")
-        << "name: sharp\nsize: 1.0\nmodules: 20\nborder: 3\nsquares:\n  A: [10, 10, 5]\n  B: [5, 13, 2]\n"
-           "  C: [5, 9, 2]\n  D: [5, 5, 2]\n  E: [9, 5, 2]\n  F: [13, 5, 2]\n";
+  SimulationFiles() {
+    folder_.write("sharp.yaml",
+                  "name: sharp\nsize: 1.0\nmodules: 20\nborder: 3\nsquares:\n  A: [10, 10, 5]\n"
+                  "  B: [5, 13, 2]\n  C: [5, 9, 2]\n  D: [5, 5, 2]\n  E: [9, 5, 2]\n  F: [13, 5, 2]\n");
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   Section section(const std::string& more = "", const std::vector<std::string>& set = {}) const {
     return Section::parse("target: sharp.yaml\n" + more, folder_ / "simulation.yaml", set);
@@ -67,7 +63,7 @@ class SimulationFiles : public testing::Test {
     folder.finish();
   }
 
-  fs::path folder_;
+  TempFolder folder_;
 };
 
 TEST_F(SimulationFiles, NeedsNothingButATarget) {
