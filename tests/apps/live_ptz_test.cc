@@ -9,9 +9,9 @@
 #include <sstream>
 
 #include "support/child_program.h"
+#include "support/free_port.h"
 #include "support/run_program.h"
 #include "support/temp_folder.h"
-#include "support/udp_port.h"
 
 namespace perch {
 namespace {
@@ -57,7 +57,7 @@ struct Rig {
 // Its lens is that of the zoom that the camera says it has: of the table's the widest.
 TEST(LivePtz, FollowsThePadThroughASimulatedHead) {
   const Rig rig("1",
-                "{start_height: 5, start_aside: 1, duration: 4, hover: 0.5, touchdown_height: 2.5, "
+                "{start_height: 5, start_aside: 1, duration: 4, hover: 6, touchdown_height: 2.5, "
                 "gust_attitude_deg: 2}");
   const TempFolder& folder = rig.folder;
   ASSERT_TRUE(rig.device->says("an EVI-D30 at", 30));

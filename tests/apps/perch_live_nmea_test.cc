@@ -131,7 +131,7 @@ TEST_F(PerchLiveNmea, PositionsAloneAreRecordedWithoutAnAttitude) {
   const auto said = receiver(false);
   ChildProgram live = start_example(*said);
   fly_with(live);
-  sleep(3);
+  sleep(6);
   EXPECT_EQ(live.stop(), 0) << live.err();
   const Flight flight = recorded();
   ASSERT_GT(flight.nav.samples.size(), 10u);

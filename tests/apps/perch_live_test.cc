@@ -17,6 +17,8 @@ namespace {
 // The bound of a vector's error: what the estimator itself says, and what a prediction from exposure to send
 // time cannot know: at 2 m/s^2 over 0.15 s, which a busy machine may take, 2 cm.
 constexpr double kPredicted = 0.02;  // m
+// What is older when it arrives is late. How far off it is is not said; it is to be the exception.
+constexpr int64_t kLate = 150 * kMs;
 
 TEST_F(PerchLive, TellsArdupilotWhereThePadIsAndWhen) {
   ChildProgram live = start({"--output", "out"});
@@ -24,6 +26,11 @@ TEST_F(PerchLive, TellsArdupilotWhereThePadIsAndWhen) {
   ASSERT_TRUE(landing_targets_come(0, 30)) << live.err();
   EXPECT_TRUE(live.says("pad TRACK", kPatience));
   EXPECT_EQ(live.stop(), 0) << live.err();
+  const json closing = summary();
+  // The last are on their way.
+  const size_t sent_count = closing["mavlink"]["sent"];
+  EXPECT_TRUE(landing_targets_come(0, sent_count));
+  EXPECT_EQ(sent_count, autopilot_.landing_targets().size());
 
   std::vector<std::string> problems;
   std::map<int64_t, VehicleState> states;  // by the stamp, us
@@ -31,6 +38,7 @@ TEST_F(PerchLive, TellsArdupilotWhereThePadIsAndWhen) {
     states[state.timestamp_ns / 1000] = state;
   const double frame_ns = 1e9 / 15;
   int64_t last_stamp = 0;
+  size_t late = 0;
   for (const auto& [arrived_ns, target] : autopilot_.landing_targets()) {
     EXPECT_EQ(target.frame, mavlink::mav_frame::kBodyFrd);
     EXPECT_EQ(target.position_valid, 1);
@@ -54,13 +62,16 @@ TEST_F(PerchLive, TellsArdupilotWhereThePadIsAndWhen) {
     const int64_t lag_ns =
         autopilot_.with([](auto& a) { return std::llround(a.parameters["PLND_LAG"] * 1e9); });
     const Eigen::Vector3d truth = pad_in_body_at(arrived_ns - lag_ns);
+    if (arrived_ns - stamp_ns > kLate) {
+      ++late;
+      continue;
+    }
     EXPECT_LT((sent - truth).norm(), 4 * sigma + kPredicted)
         << "sent " << sent.transpose() << ", true " << truth.transpose() << ", sigma " << sigma;
   }
+  EXPECT_LT(2 * late, sent_count);
   EXPECT_THAT(autopilot_.with([](auto& a) { return mavlink::text_of(a.texts.at(0).text); }),
               HasSubstr("Perch: pad "));
-  const json closing = summary();
-  EXPECT_EQ(closing["mavlink"]["sent"], autopilot_.landing_targets().size());
   EXPECT_GE(closing["latency_us"]["total"]["count"], 30);
   EXPECT_NEAR(closing["mavlink"]["clock"]["skew"].get<double>(), 50e-6, 200e-6);  // of seconds with ms jitter
 }
@@ -82,6 +93,7 @@ TEST_F(PerchLive, SaysNothingWrongThroughFaultsAndRecovers) {
     autopilot_.send_raw(garbage);
     autopilot_.send_raw({foreign.begin(), foreign.begin() + 15});
     autopilot_.send_raw(foreign);
+    sleep(0.005);  // no more at once than a socket holds
   }
   // Its clock is set; it loses half of all it hears and says.
   autopilot_.with([](auto& autopilot) { autopilot.booted_ns -= 3 * kSecond; });
@@ -103,15 +115,20 @@ TEST_F(PerchLive, SaysNothingWrongThroughFaultsAndRecovers) {
   EXPECT_TRUE(landing_targets_come(back_ns, 10)) << live.err();
   EXPECT_EQ(live.stop(), 0) << live.err();
 
-  for (const auto& [arrived_ns, target] : autopilot_.landing_targets()) {
+  const auto targets = autopilot_.landing_targets();
+  size_t late = 0;
+  for (const auto& [arrived_ns, target] : targets) {
     const Eigen::Vector3d sent(target.x, target.y, target.z);
     const Eigen::Vector3d truth = pad_in_body_at(arrived_ns - 20 * kMs);
-    // Far less than any fault would make it: half a turn, 3 s.
-    EXPECT_LT((sent - truth).norm(), 0.1) << sent.transpose() << ", true " << truth.transpose();
     const auto stamp_ns = static_cast<int64_t>(target.time_usec) * 1000;
+    late += arrived_ns - stamp_ns > kLate;
+    // Far less than any fault would make it: half a turn, 3 s.
+    EXPECT_LT((sent - truth).norm(), arrived_ns - stamp_ns > kLate ? 0.5 : 0.1)
+        << sent.transpose() << ", true " << truth.transpose();
     EXPECT_LT(arrived_ns - stamp_ns, 500 * kMs);
     EXPECT_GE(arrived_ns - stamp_ns, 0);
   }
+  EXPECT_LT(2 * late, targets.size());
   const json mavlink = summary()["mavlink"];
   EXPECT_GE(mavlink["heard"]["foreign"], 50);
   EXPECT_GE(mavlink["heard"]["skipped_bytes"], 50 * 300);
@@ -176,6 +193,7 @@ TEST_F(PerchLive, ACameraThatHangsIsNotBelieved) {
            " loop=true caps=image/png,framerate=15/1 ! pngdec ! videoconvert ! video/x-raw,format=GRAY8 ! "
            "identity sync=true"});
   EXPECT_TRUE(live.says("pad LOST", kPatience)) << live.err();
+  sleep(2);  // thirty more of the same
   EXPECT_EQ(live.stop(), 0) << live.err();
   EXPECT_LE(autopilot_.landing_targets().size(), 1u);
   const json closing = summary();
@@ -218,7 +236,8 @@ class NotifySocket {
 TEST_F(PerchLive, TellsTheServiceManagerThatAllGoOnThoughThereIsNoRecording) {
   NotifySocket manager(folder_ / "notify");
   setenv("NOTIFY_SOCKET", (folder_ / "notify").c_str(), 1);
-  setenv("WATCHDOG_USEC", "800000", 1);
+  // So seldom that the socket holds all that is said while nobody reads: a word that cannot be said is not.
+  setenv("WATCHDOG_USEC", "3000000", 1);
   ChildProgram live = start({"--set", "outputs.record=run.yaml/flights"});
   unsetenv("NOTIFY_SOCKET");
   unsetenv("WATCHDOG_USEC");

@@ -16,11 +16,13 @@
 #include <array>
 #include <atomic>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "links/mavlink/fake_autopilot.h"
@@ -210,9 +212,16 @@ class RealTimeAutopilot {
     const std::lock_guard lock(mutex_);
     return work(autopilot_);
   }
-  std::vector<Arrival<LandingTarget>> landing_targets() const {
+  // Those of which it is known to so much when they came: where the kernel does not say so, they may have
+  // come since this thread last looked.
+  std::vector<Arrival<LandingTarget>> landing_targets(
+      int64_t known_to_ns = std::numeric_limits<int64_t>::max()) const {
     const std::lock_guard lock(mutex_);
-    return landing_targets_;
+    std::vector<Arrival<LandingTarget>> known;
+    for (const auto& [arrival, not_before_ns] : landing_targets_) {
+      if (arrival.arrived_ns - not_before_ns <= known_to_ns) known.push_back(arrival);
+    }
+    return known;
   }
   std::vector<Arrival<TargetRelative>> relative_targets() const {
     const std::lock_guard lock(mutex_);
@@ -236,15 +245,18 @@ class RealTimeAutopilot {
  private:
   void run() {
     std::vector<uint8_t> buffer(2048);
+    int64_t before_ns = monotonic_ns();  // the look before this one, after which nothing was left
     while (!stop_) {
+      const int64_t now_ns = monotonic_ns();
       pollfd waiting{wire_->descriptor(), POLLIN, 0};
       const bool readable = poll(&waiting, 1, 1) > 0;
       const std::lock_guard lock(mutex_);
       if (readable) {
         const auto bytes = std::span(buffer).first(wire_->read(buffer));
         autopilot_.receive(bytes, monotonic_ns());
-        note_targets(bytes);
+        note_targets(bytes, before_ns);
       }
+      before_ns = now_ns;
       autopilot_.step(monotonic_ns(), [&](const std::vector<uint8_t>& bytes, int64_t) {
         const bool cut = cut_every_ > 0 && ++frames_ % cut_every_ == 0;
         wire_->write(std::span(bytes).first(cut ? bytes.size() / 2 : bytes.size()));
@@ -253,10 +265,11 @@ class RealTimeAutopilot {
   }
 
   // With the time at which they really came: the fake autopilot hears everything later.
-  void note_targets(std::span<const uint8_t> bytes) {
-    const int64_t now_ns = wire_->arrived_ns();
+  void note_targets(std::span<const uint8_t> bytes, int64_t before_ns) {
+    const int64_t now_ns = wire_->arrived_ns(), not_before_ns = wire_->datagrams() ? now_ns : before_ns;
     const auto note = [&](const Frame& frame) {
-      if (const auto m = decode<LandingTarget>(frame)) landing_targets_.push_back({now_ns, *m});
+      if (const auto m = decode<LandingTarget>(frame))
+        landing_targets_.push_back({{now_ns, *m}, not_before_ns});
       if (const auto m = decode<TargetRelative>(frame)) relative_targets_.push_back({now_ns, *m});
       unsigned_ += !frame.is_signed;
     };
@@ -268,7 +281,7 @@ class RealTimeAutopilot {
   mutable std::mutex mutex_;  // of what follows, and of the wire's reading and writing
   FakeAutopilot autopilot_;
   FrameParser parser_;
-  std::vector<Arrival<LandingTarget>> landing_targets_;
+  std::vector<std::pair<Arrival<LandingTarget>, int64_t>> landing_targets_;  // with when it was not there yet
   std::vector<Arrival<TargetRelative>> relative_targets_;
   size_t unsigned_ = 0;
   int cut_every_ = 0;

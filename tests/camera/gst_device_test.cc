@@ -26,6 +26,13 @@ std::unique_ptr<LiveSource> open(const std::string& pipeline, const LiveOptions&
   return open_live_source("gst:" + pipeline, options, channel);
 }
 
+// A machine that stands still for a moment is no camera that stopped.
+LiveOptions patient() {
+  LiveOptions options;
+  options.stall = 10;
+  return options;
+}
+
 // The pictures of the next while, their pixels kept.
 std::vector<LiveFrame> watch(LiveSource& source, milliseconds duration, size_t at_most = 1000) {
   std::vector<LiveFrame> pictures;
@@ -47,7 +54,7 @@ int64_t median(std::vector<int64_t> values) {
 }
 
 TEST(GstDevice, GivesALivePipelinesPicturesWithTheirTimes) {
-  const auto source = open("videotestsrc is-live=true pattern=white" + kSmall);
+  const auto source = open("videotestsrc is-live=true pattern=white" + kSmall, patient());
   const auto pictures = watch(*source, seconds(10), 25);
   ASSERT_EQ(pictures.size(), 25U);
   EXPECT_EQ(source->counters().last_problem, "");
@@ -84,28 +91,34 @@ TEST(GstDevice, AMistakeInThePipelineIsSaidAtOnce) {
 
 TEST(GstDevice, WhatIsNotThereIsTriedAgainAndSaid) {
   const auto source = open("filesrc location=/nowhere/film.avi ! decodebin");
-  EXPECT_TRUE(watch(*source, milliseconds(400)).empty());
+  for (int i = 0; i < 100 && source->counters().open_failed < 2; ++i)
+    EXPECT_TRUE(watch(*source, milliseconds(100)).empty());
   EXPECT_GE(source->counters().open_failed, 2);
   EXPECT_THAT(source->counters().last_problem, AllOf(HasSubstr("film.avi"), HasSubstr("No such file")));
 }
 
 TEST(GstDevice, AStreamThatEndsOrFailsIsOpenedAnew) {
   for (const char* trouble : {"num-buffers=5", "! identity error-after=5"}) {
-    const auto source = open(std::string("videotestsrc is-live=true ") + trouble + kSmall);
+    const auto source = open(std::string("videotestsrc is-live=true ") + trouble + kSmall, patient());
     const auto pictures = watch(*source, seconds(20), 12);
     EXPECT_EQ(pictures.size(), 12U) << trouble;
     EXPECT_GE(source->counters().reopened, 2) << trouble;
     EXPECT_THAT(source->counters().last_problem,
                 HasSubstr(trouble[0] == '!' ? ": Failed after iterations as requested" : "stream ended"));
-    for (size_t i = 1; i < pictures.size(); ++i) {
+    std::vector<int64_t> ages;
+    for (size_t i = 0; i < pictures.size(); ++i) {
+      ages.push_back(pictures[i].arrived_ns - pictures[i].frame.timestamp_ns);
+      if (i == 0) continue;
       EXPECT_GT(pictures[i].frame.timestamp_ns, pictures[i - 1].frame.timestamp_ns);
-      EXPECT_LT(pictures[i].arrived_ns - pictures[i].frame.timestamp_ns, 500 * kMs);
     }
+    ASSERT_FALSE(ages.empty());
+    EXPECT_LT(median(ages), 500 * kMs);
   }
 }
 
 TEST(GstDevice, WhatIsNotLiveIsPlayedInRealTime) {
-  const auto source = open("videotestsrc num-buffers=20" + kSmall);
+  // More than are asked for: some are lost to whoever comes late.
+  const auto source = open("videotestsrc num-buffers=500" + kSmall, patient());
   const int64_t start = camera_now_ns();
   EXPECT_GE(watch(*source, seconds(10), 15).size(), 15U);
   EXPECT_EQ(source->counters().reopened, 0);
@@ -134,15 +147,24 @@ TEST(GstDevice, OneChannelOfColour) {
 }
 
 TEST(GstDevice, WhoIsSlowGetsTheNewestAndTheRestIsCounted) {
-  const auto source = open("videotestsrc is-live=true" + kSmall);
-  ASSERT_EQ(watch(*source, seconds(10), 3).size(), 3U);
-  const int64_t dropped = source->counters().dropped;
-  std::this_thread::sleep_for(milliseconds(400));
-  const auto pictures = watch(*source, seconds(10), 2);
-  ASSERT_EQ(pictures.size(), 2U);
-  EXPECT_LT(pictures[0].arrived_ns - pictures[0].frame.timestamp_ns, 150 * kMs);
-  EXPECT_GE(source->counters().dropped - dropped, 12);
-  EXPECT_LE(source->counters().dropped - dropped, 40);
+  const auto source = open("videotestsrc is-live=true" + kSmall, patient());
+  int64_t dropped = 0, age = 0;
+  // Several times: on a busy machine the newest itself may come late.
+  for (int i = 0; i < 5 && (dropped < 12 || age >= 150 * kMs); ++i) {
+    const auto before = watch(*source, seconds(10), 3);
+    ASSERT_EQ(before.size(), 3U);
+    const int64_t dropped_before = source->counters().dropped;
+    std::this_thread::sleep_for(milliseconds(400));
+    const auto after = watch(*source, seconds(10), 2);
+    ASSERT_EQ(after.size(), 2U);
+    dropped = source->counters().dropped - dropped_before;
+    age = after[0].arrived_ns - after[0].frame.timestamp_ns;
+    // Their times tell how many there were meanwhile.
+    const int64_t passed_ns = after[1].frame.timestamp_ns - before[2].frame.timestamp_ns;
+    EXPECT_EQ(dropped, (passed_ns + 10 * kMs) / (20 * kMs) - 2);
+  }
+  EXPECT_GE(dropped, 12);
+  EXPECT_LT(age, 150 * kMs);
 }
 
 struct Transport {
@@ -194,8 +216,9 @@ TEST_P(Rtp, ASenderThatChangesItsSizeStopsAndComesBack) {
   options.first_picture = 1;
   const auto source = open(receiver(), options);
   ASSERT_EQ(stream(*source, 16, seconds(15), 10).size(), 10U) << source->counters().last_problem;
-  watch(*source, milliseconds(600));
-  EXPECT_GE(source->counters().stalled, 1);
+  const int64_t stalled = source->counters().stalled;
+  for (int i = 0; i < 500 && source->counters().stalled == stalled; ++i) source->next(milliseconds(20));
+  EXPECT_GT(source->counters().stalled, stalled);
   EXPECT_THAT(source->counters().last_problem, HasSubstr(": no picture for 400 ms"));
   const auto other = stream(*source, GetParam().name == std::string("jpeg") ? 24 : 16, seconds(15), 10);
   EXPECT_EQ(other.size(), 10U) << source->counters().last_problem;

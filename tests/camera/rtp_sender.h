@@ -8,7 +8,7 @@
 #include <string>
 
 #include "perch/camera/live_source.h"
-#include "support/udp_port.h"
+#include "support/free_port.h"
 
 namespace perch {
 

@@ -18,6 +18,9 @@ namespace perch {
 // A TCP client that sends any bytes, well-formed or not.
 class RawClient {
  public:
+  // How long what comes at once is waited for, on a machine that others load.
+  static constexpr double kPatience = 20;  // s
+
   explicit RawClient(uint16_t port, int receive_buffer = 0) : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
     if (receive_buffer > 0)
       setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof(receive_buffer));
@@ -46,7 +49,7 @@ class RawClient {
     return all;
   }
   // The other side has closed within the time; what it sent until then is dropped.
-  bool closed_within(double seconds) {
+  bool closed_within(double seconds = kPatience) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
     while (std::chrono::steady_clock::now() < end) {
       pollfd waiting{socket_, POLLIN, 0};
@@ -58,7 +61,7 @@ class RawClient {
   }
   std::string request(const std::string& text) {
     send(text);
-    return receive(3);
+    return receive(kPatience);
   }
 
   // ---- WebSocket ----
@@ -69,7 +72,7 @@ class RawClient {
          "\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: "
          "dGhlIHNhbXBsZSBub25jZQ==\r\n" +
          more + "\r\n");
-    while (buffer_.find("\r\n\r\n") == std::string::npos && fill(3)) {
+    while (buffer_.find("\r\n\r\n") == std::string::npos && fill(kPatience)) {
     }
     head_ = buffer_.substr(0, buffer_.find("\r\n\r\n"));
     buffer_.erase(0, head_.size() + 4);
@@ -93,7 +96,7 @@ class RawClient {
     int opcode = -1;  // 1 text, 2 binary, 8 close; -1: none came
     std::string payload;
   };
-  Message next(double seconds = 3) {
+  Message next(double seconds = kPatience) {
     while (buffer_.size() < 2 && fill(seconds)) {
     }
     if (buffer_.size() < 2) return {};

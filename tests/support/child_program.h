@@ -66,7 +66,7 @@ class ChildProgram {
     }
     return -2;
   }
-  int stop(double seconds = 20) {
+  int stop(double seconds = 60) {
     signal(SIGTERM);
     return wait(seconds);
   }

@@ -7,9 +7,9 @@
 
 namespace perch {
 
-// A UDP port of this machine that nobody uses.
-inline int free_udp_port() {
-  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+// A port of this machine that nobody uses.
+inline int free_port(int type) {
+  const int fd = socket(AF_INET, type, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -19,5 +19,7 @@ inline int free_udp_port() {
   close(fd);
   return ntohs(address.sin_port);
 }
+inline int free_tcp_port() { return free_port(SOCK_STREAM); }
+inline int free_udp_port() { return free_port(SOCK_DGRAM); }
 
 }  // namespace perch
