@@ -133,6 +133,19 @@ TEST_F(LiveGimbal, FollowsThePadAndTheAutopilotIsToldWhereItIs) {
   EXPECT_GT(autopilot_.with([](auto& a) { return a.heard[GimbalManagerSetPitchyaw::kId]; }), 20);
 }
 
+// What somebody else steers: its angles are heard, and nothing is told.
+TEST_F(LiveGimbal, ThatIsNotToFollowIsLeftToWhoeverMovesIt) {
+  ChildProgram live = start({"--set", "ptz.follow=false"});
+  fly_with(live);
+  sleep(3);
+  const auto told = autopilot_.with(
+      [&](auto& a) { return std::pair(a.heard[GimbalManagerSetPitchyaw::kId], gimbal_.pitch); });
+  EXPECT_EQ(live.stop(), 0) << live.err();
+  EXPECT_EQ(told.first, 0);
+  EXPECT_EQ(told.second, -0.3);
+  EXPECT_EQ(autopilot_.with([](auto& a) { return a.heard[GimbalManagerSetPitchyaw::kId]; }), 0);
+}
+
 TEST_F(LiveGimbal, IsAnErrorWithoutTheAutopilotOrWithAZoom) {
   for (const auto& [set, message] : {std::pair("nav=none", "ptz.device: expected mavlink with nav"),
                                      {"ptz.fill=0.5", "ptz.fill: expected none"}}) {

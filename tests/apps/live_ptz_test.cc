@@ -79,8 +79,19 @@ TEST(LivePtz, FollowsThePadThroughASimulatedHead) {
   EXPECT_GT(json["status"]["ok"], json["frames"].get<int>() / 2);
 }
 
+// A recording's table of estimates without the measured times, its last three columns.
+std::string without_times(const std::filesystem::path& file) {
+  std::istringstream text(read_file(file));
+  std::string all;
+  for (std::string line; std::getline(text, line);) {
+    for (int i = 0; i < 3; ++i) line.resize(line.rfind(','));
+    all += line + "\n";
+  }
+  return all;
+}
+
 // 5 m over the pad it fills a quarter of the picture's height at the widest zoom; the poses tell that the
-// lens of each picture's own zoom was used.
+// lens of each picture's own zoom was used. And the recording gives them again.
 TEST(LivePtz, ZoomsSoThatThePadFillsThePicture) {
   Rig rig("4",
           "{start_height: 5, start_aside: 0.3, duration: 1, touchdown_height: 5, hover: 12, "
@@ -90,7 +101,7 @@ TEST(LivePtz, ZoomsSoThatThePadFillsThePicture) {
   rig.folder.write("tele.cameramodel", pinhole(4 * 352.7));
   rig.folder.write("zoom.yaml",
                    "models: [{zoom: 0, model: wide.cameramodel}, {zoom: 1, model: tele.cameramodel}]\n");
-  rig.write_live(", fill: 0.7", ", zoom_table: zoom.yaml");
+  rig.write_live(", fill: 0.7", ", zoom_table: zoom.yaml", "outputs: {record: flights}\n");
   ChildProgram live(rig.live_folder, PERCH_LIVE,
                     {"--config", rig.folder / "live.yaml", "--summary", rig.folder / "summary.json",
                      "--output", rig.folder / "estimates"});
@@ -112,6 +123,14 @@ TEST(LivePtz, ZoomsSoThatThePadFillsThePicture) {
     right += std::abs(std::stod(cell) - 5) < 0.4;
   }
   EXPECT_GT(rows, 60);
+  const std::filesystem::path flight = *std::filesystem::directory_iterator(rig.folder / "flights");
+  const Outcome again = run_program_in(
+      rig.folder, PERCH_BATCH,
+      "--config " + (flight / "run/config.yaml").string() + " --output again " + flight.string());
+  ASSERT_EQ(again.code, 0) << again.err;
+  const std::filesystem::path output = rig.folder / "again" / flight.filename();
+  EXPECT_EQ(without_times(output / "estimates.csv"), without_times(flight / "run/estimates.csv"));
+  EXPECT_EQ(read_file(output / "states.csv"), read_file(flight / "run/states.csv"));
   EXPECT_GT(right, 0.95 * rows);
 }
 

@@ -162,6 +162,8 @@ void SimulatedEviD30::knock(double pan, double tilt) {
   tilt_.angle = std::clamp(tilt_.angle + tilt, -kTiltLimit, kTiltLimit);
 }
 
+void SimulatedEviD30::zoom_by_hand(double zoom) { zoom_ = zoom_goal_ = zoom; }
+
 void SimulatedEviD30::send(std::vector<uint8_t> bytes, uint32_t sequence) {
   if (options_.over_ip) {
     std::vector<uint8_t> datagram{0x01, 0x11, 0x00, static_cast<uint8_t>(bytes.size())};

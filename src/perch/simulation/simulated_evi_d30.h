@@ -43,6 +43,8 @@ class SimulatedEviD30 {
   void restart();
   // Somebody turns it by hand.
   void knock(double pan, double tilt);
+  // Somebody zooms it with its remote control.
+  void zoom_by_hand(double zoom);
 
   struct Counters {
     uint64_t packets = 0, commands = 0, inquiries = 0, errors = 0;

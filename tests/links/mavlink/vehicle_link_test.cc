@@ -460,6 +460,37 @@ TEST(AskedVehicleLink, LostLateAndDoubledAnswersPlaceNoAttitudeWrongly) {
   }
 }
 
+// One that answers at once, but with what it said before: the attitude of then is not that of now.
+TEST(AskedVehicleLink, WhatItSaidBeforeIsNoNews) {
+  VehicleLink link(asking());
+  int64_t now_ns = kSecond;
+  FrameWriter writer(1, 1);
+  const auto answer = [&](const auto& message) {
+    std::vector<uint8_t> bytes;
+    writer.append(bytes, message);
+    link.receive(bytes, now_ns += 2 * kMs, true);
+  };
+  answer(heartbeat_of(2, mav_autopilot::kArdupilot));
+  ASSERT_EQ(link.state(), LinkState::kUp);
+  // Each question is answered, the third and the fourth with the second's answer.
+  int answers = 0;
+  FrameParser parser;
+  for (; answers < 4 && now_ns < 30 * kSecond; now_ns += 5 * kMs) {
+    int asked = 0;
+    parser.parse(link.tick(now_ns), [&](const Frame& frame) {
+      const auto command = decode<CommandLong>(frame);
+      asked += command && static_cast<uint32_t>(command->param1) == Attitude::kId;
+    });
+    if (asked == 0) continue;
+    Attitude attitude;
+    attitude.time_boot_ms = answers == 0 ? 5000 : 5025;
+    const auto refused = link.statistics().times_implausible;
+    answer(attitude);
+    EXPECT_EQ(link.statistics().times_implausible - refused, ++answers > 2 ? 1u : 0u) << answers;
+  }
+  EXPECT_EQ(answers, 4);
+}
+
 TEST(AskedVehicleLink, GarbageBetweenTheAnswersDoesNoHarm) {
   AskedWorld world;
   world.autopilot.unanswered = {Timesync::kId, SystemTime::kId};

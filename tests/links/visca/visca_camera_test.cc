@@ -154,6 +154,26 @@ TEST(ViscaCamera, NoticesThatSomebodyTurnedTheHead) {
   EXPECT_NEAR(said->pan, 50 * kDeg, kDeg / 8.8);
 }
 
+// Somebody at the remote control wants another zoom: told thrice again, then left in peace; told anew, it is
+// told thrice again.
+TEST(ViscaCamera, AZoomThatDoesNotComeIsToldThriceAgain) {
+  ViscaRig rig;
+  rig.run(1);
+  const auto commands_of = [&](double zoom, bool somebody) {
+    const auto before = rig.device().counters().commands;
+    rig.camera().zoom_to(zoom);
+    for (int i = 0; i < 600; ++i) {
+      if (somebody) rig.device().zoom_by_hand(0.3);
+      rig.run(0.02);
+    }
+    return rig.device().counters().commands - before;
+  };
+  EXPECT_EQ(commands_of(0.8, true), 4u);
+  EXPECT_EQ(commands_of(0.6, true), 4u);
+  EXPECT_EQ(commands_of(0.7, false), 1u);
+  EXPECT_NEAR(rig.camera().zoom().value_or(-1), 0.7, 0.01);
+}
+
 // The device looks at what came once a field. After some questions each gets there just before.
 TEST(ViscaCamera, AsksJustBeforeTheDeviceLooks) {
   ViscaRig rig;
