@@ -18,16 +18,21 @@ DetectionOptions by(DetectionMethod method) {
   return options;
 }
 
-// What a filter expects a frame after the last: 2 cm and a degree off.
-Prediction near(const Rigid3& truth, RandomStream& random) {
+// On the simulated landing the filter's prediction puts the target's corners 0.11 to 0.15 px off in the
+// median, at most 0.27 px in 95 of 100 frames. This part of what it claims is 0.3 px in these scenes.
+constexpr double kUsual = 0.03;
+
+// What a filter expects a frame after the last: it says 2 cm and a degree, and is off by `part` of that.
+Prediction near(const Rigid3& truth, double part, RandomStream& random) {
   PoseCovariance covariance = PoseCovariance::Zero();
   covariance.diagonal() << Eigen::Vector3d::Constant(4e-4), Eigen::Vector3d::Constant(3e-4);
   PoseError error;
-  for (int i = 0; i < 6; ++i) error(i) = std::sqrt(covariance(i, i)) * random.normal();
-  return {{perturb(truth, error), covariance}};
+  for (int i = 0; i < 6; ++i) error(i) = part * std::sqrt(covariance(i, i)) * random.normal();
+  return {{perturb(truth, error), covariance}, 0.75};
 }
 
-void frame(benchmark::State& state, const SceneKind& kind, const DetectionOptions& options, bool following) {
+void frame(benchmark::State& state, const SceneKind& kind, const DetectionOptions& options,
+           std::optional<double> off) {
   const Scene& shared = scene(kind);
   const auto detector = make_detector(shared.squares, shared.camera, options);
   PoseEstimator estimator(shared.squares, shared.camera, {});
@@ -35,7 +40,7 @@ void frame(benchmark::State& state, const SceneKind& kind, const DetectionOption
   RandomStream random(7);
   for (const View& view : shared.views) {
     shots.push_back({view.squares, view.camera_from_target});
-    if (following) shots.back().prediction = near(view.camera_from_target, random);
+    if (off) shots.back().prediction = near(view.camera_from_target, *off, random);
   }
   time_poses(state, shots, find_by(*detector, estimator));
 }
@@ -92,9 +97,10 @@ const bool kRegistered = [] {
          {std::pair(DetectionMethod::kPaper, "paper"), {DetectionMethod::kEdges, "edges"}}) {
       const DetectionOptions options = by(method);
       const std::string row = which;
-      add(row + "_frame", [=](auto& state, const SceneKind& k) { frame(state, k, options, false); });
+      add(row + "_frame", [=](auto& state, const SceneKind& k) { frame(state, k, options, {}); });
       if (method == DetectionMethod::kEdges) {
-        add(row + "_follow", [=](auto& state, const SceneKind& k) { frame(state, k, options, true); });
+        add(row + "_follow", [=](auto& state, const SceneKind& k) { frame(state, k, options, kUsual); });
+        add(row + "_bump", [=](auto& state, const SceneKind& k) { frame(state, k, options, 1); });
       }
       add(row + "_detection", [=](auto& state, const SceneKind& k) { detection(state, k, options); });
       add(row + "_pose", [=](auto& state, const SceneKind& k) { pose(state, k, options); });

@@ -67,7 +67,7 @@ class Both {
  private:
   // Of six degrees of freedom: the picture and its noise are the same, but for the lines at the pieces' ends
   // that one of the two takes in. Two pictures would be 6 apart.
-  static constexpr double kMostMean = 0.1, kMost = 2;
+  static constexpr double kMostMean = 0.3, kMost = 2;
 
   std::unique_ptr<Estimator> with_, without_;
   int frames_ = 0, found_with_ = 0, found_without_ = 0, followed_ = 0;

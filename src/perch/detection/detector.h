@@ -37,6 +37,7 @@ struct PlaneMeasurement {
   double rms_px = 0;                                        // of the edges' distances from it
   double sigma_px = 1;                                      // of an edge, as the information has it
   double growth_px = 0;                                     // of white on every side: blooming
+  double blur_px = 0;                                       // deviation, as far as it is known
   int edges = 0;                                            // pieces of edges
 };
 
@@ -61,6 +62,7 @@ struct Detection {
 // Where the target is expected, from the previous frames.
 struct Prediction {
   UncertainRigid3 camera_from_target;
+  double blur_px = 0;  // of the edges; 0: nobody knows
 };
 
 // Finds the target in a picture. Keeps its buffers from call to call, so one Detector serves one thread; it

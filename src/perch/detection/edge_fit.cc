@@ -74,12 +74,14 @@ struct EdgeFit::Piece {
   double part = 0.5;   // of the piece, where its lines are in the mean
   double shift = 0;    // px along the lines
   double blur_px = 1;  // of the templates, along the lines
+  double reach = 1;    // of the templates
+  double gain = 1;     // of a small offset, what the templates' slope makes of it
   double along_normal = 1;
   bool rows = true;
   int index = 0;
 
   double sign() const { return along_normal > 0 ? 1 : -1; }  // 1: white lies behind black on a line
-  double offset_of(const Eigen::Vector3d& x) const { return -x(2) / x(1) - off; }
+  double offset_of(const Eigen::Vector3d& x) const { return -x(2) / (x(1) * gain) - off; }
 };
 
 namespace {
@@ -161,6 +163,16 @@ LevelSurface::Level believed(const EdgeFit::Piece& piece, const LevelSurface& su
   return unknown;
 }
 
+// Of the slope of a step of one blur, by least squares, as that of the templates', the level being free: as
+// two Gaussians overlap within the reach.
+double gain_of(double blur, double template_blur, double reach) {
+  const double level = 0.5 / reach;
+  const auto overlap = [&](double b) {
+    return 1 / std::sqrt(2 * M_PI * (b * b + template_blur * template_blur)) - level;
+  };
+  return overlap(blur) / overlap(template_blur);
+}
+
 struct Step {
   double offset = 0, sigma = 0;  // along the line, px
   double contrast = 0;
@@ -190,7 +202,7 @@ Step solve(const EdgeFit::Piece& piece, const LevelSurface::Level& white, const 
   const double of_gradient = covariance.row(2).dot(by_gradient) / piece.variance *
                              std::hypot(white.gradient_sigma, black.gradient_sigma);
   const double sigma = std::sqrt(covariance(2, 2) + of_gradient * of_gradient);
-  return {piece.offset_of(x), sigma / std::abs(x(1)), std::abs(x(1))};
+  return {piece.offset_of(x), sigma / std::abs(x(1) * piece.gain), std::abs(x(1))};
 }
 
 }  // namespace
@@ -212,6 +224,8 @@ bool EdgeFit::fit(const cv::Mat& grey, const EdgePiece& piece, const EdgeFitOpti
   const int step = std::max(1, count * 4 / std::max(1, options.lines_per_edge));
   fitted.blur_px = options.blur / cosine;
   const StepTemplates& table = templates_.of(reach, &fitted.blur_px);
+  fitted.reach = table.reach();
+  fitted.gain = 1;
   fitted.shift = 0;
   fitted.along_normal = lines.along_normal();
   fitted.rows = lines.rows();
@@ -230,8 +244,9 @@ bool EdgeFit::fit(const cv::Mat& grey, const EdgePiece& piece, const EdgeFitOpti
 void EdgeFit::find_levels(std::span<const EdgePiece> pieces, std::span<const uint8_t> on_ground) {
   for (Piece& p : fitted_) {
     const Eigen::Vector2d& normal = pieces[static_cast<size_t>(p.index)].normal;
-    p.narrower =
-        p.own(1) * (1 - std::sqrt(normal.dot(blur_ * normal)) / (std::abs(p.along_normal) * p.blur_px));
+    const double blur = std::sqrt(normal.dot(blur_ * normal)) / std::abs(p.along_normal);
+    p.gain = gain_of(blur, p.blur_px, p.reach);
+    p.narrower = p.own(1) * (1 - blur / p.blur_px);
     p.b -= p.narrower * p.by_w;
     p.own = p.inverse * p.b;
   }
@@ -292,10 +307,15 @@ void EdgeFit::measure(const cv::Mat& grey, std::span<const EdgePiece> pieces,
   offsets.clear();
   pieces_measured.clear();
   fitted_.clear();
+  auto may_fail = (1 - options.least_measured) * static_cast<double>(std::ranges::count(on_ground, 0));
   Piece fitted;
   for (size_t i = 0; i < pieces.size(); ++i) {
     fitted.index = static_cast<int>(i);
-    if (fit(grey, pieces[i], options, fitted)) fitted_.push_back(fitted);
+    if (fit(grey, pieces[i], options, fitted)) {
+      fitted_.push_back(fitted);
+    } else if (!on_ground[i] && --may_fail < 0) {
+      return;
+    }
   }
   find_blur(pieces, options.blur);
   find_levels(pieces, on_ground);

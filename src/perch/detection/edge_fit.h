@@ -17,6 +17,8 @@ struct EdgeFitOptions {
   int lines_per_edge = 64;
   double blur = 0.8;     // of the picture across edges, the pixel's own included, px
   double contrast = 12;  // of a step, at least; grey levels
+  // Of the pieces that are not on the ground: where it cannot be so large a part, none is measured.
+  double least_measured = 0;
 };
 
 // Measures pieces of edges to a few hundredths of a pixel: the lines across a piece, each at its own

@@ -51,8 +51,8 @@ constexpr double kExplained = 0.85;
 constexpr double kPiece = 32;  // px
 
 // A first look at the edges is the last where it moves none of them by more than this, finds the blur that
-// was expected, to a part of it, and of the pieces at least this part.
-constexpr double kStill = 0.1;  // px
+// was expected, to a part of it, and at least this part of the pieces of the target's own edges.
+constexpr double kStill = 0.3;  // px
 constexpr double kSameBlur = 0.15, kMostPieces = 0.9;
 constexpr int kMostLooks = 3;
 
@@ -71,6 +71,12 @@ struct Level {
   cv::Mat grey;
   CameraModel camera;
   RegionSearch regions;
+};
+
+// Where the frames before lead to expect the target.
+struct Predicted {
+  Eigen::Matrix3d image_from_plane;
+  double radius = 0;  // px that its edges may be off, as it claims
 };
 
 bool is_explained(const Confirmed& found) { return found.found >= kExplained * found.asked; }
@@ -99,6 +105,7 @@ EdgesOptions read_edges_options(Section edges) {
 struct EdgesDetector::Work {
   LandingTarget target;
   TargetEdges edges;
+  int own_edges = 0;  // without those between the target and the ground
   CameraModel camera;
   EdgesOptions options;
   RegionSearch regions;
@@ -125,6 +132,7 @@ struct EdgesDetector::Work {
         regions(t, edges, c, o.min_found, o.min_contrast),
         confirmation(t, edges, c),
         picture_fit(edges, c) {
+    for (const TargetEdge& edge : edges.edges) own_edges += !is_outline(edge);
     halves.reserve(kMostHalves);
     const CameraModel* last = &camera;
     while (halves.size() < kMostHalves && std::min(last->width(), last->height()) >= kLeastSide) {
@@ -136,13 +144,19 @@ struct EdgesDetector::Work {
 
   void search(const cv::Mat& grey, Stopwatch& stopwatch);
   void search_means(const cv::Mat& grey, RegionSearch& search_regions, Stopwatch& stopwatch);
-  std::optional<Confirmed> follow(const cv::Mat& grey, const Prediction& prediction);
-  bool is_outline(const EdgePiece& piece) const;
-  double smallest_square_px(const Confirmed& found) const;
+  std::optional<Predicted> predicted(const Prediction& prediction) const;
+  bool measure_predicted(const cv::Mat& grey, const Predicted& expected, double blur_px);
+  std::optional<Confirmed> follow(const cv::Mat& grey, const Predicted& expected);
+  bool is_outline(const TargetEdge& edge) const;
+  double smallest_square_px(const ImageFrame& frame) const;
   void share_growth();
-  std::optional<PlaneMeasurement> measure_edges(const cv::Mat& grey, const Confirmed& found);
+  bool is_all_in_view() const;
+  bool is_most_measured() const;
+  std::optional<PlaneMeasurement> measure_edges(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
+                                                double blur_px, bool is_predicted);
   std::optional<PlaneMeasurement> measure_picture(const cv::Mat& grey, const Confirmed& found);
-  bool measure(const cv::Mat& grey, const Confirmed& found);
+  void measure(const cv::Mat& grey, const Confirmed& found);
+  void take(const PlaneMeasurement& plane);
   void add_corners(const PlaneMeasurement& plane);
 };
 
@@ -160,13 +174,13 @@ EdgesDetector::EdgesDetector(const LandingTarget& target, const CameraModel& cam
 
 EdgesDetector::~EdgesDetector() = default;
 
-double EdgesDetector::Work::smallest_square_px(const Confirmed& found) const {
+double EdgesDetector::Work::smallest_square_px(const ImageFrame& frame) const {
   double smallest = target.size;
   for (const TargetShape& shape : edges.shapes) smallest = std::min(smallest, shape.side);
-  return 2 * found.frame.radius * camera.intrinsics()[0] * smallest / target.size;
+  return 2 * frame.radius * camera.intrinsics()[0] * smallest / target.size;
 }
 
-std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const Prediction& prediction) {
+std::optional<Predicted> EdgesDetector::Work::predicted(const Prediction& prediction) const {
   const auto& [mean, covariance] = prediction.camera_from_target;
   const Eigen::Matrix3d R = mean.rotation.toRotationMatrix();
   Eigen::Matrix3d H;
@@ -179,8 +193,23 @@ std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const 
   const double radius = 3 * focal * std::hypot(shift, turn);
   // A prediction is mostly far better than what it promises; one that is not is not confirmed.
   if (!(radius < 0.5 * focal * target.size / distance)) return std::nullopt;
+  return Predicted{H, radius};
+}
+
+// Mostly the edges are within a fraction of a pixel of where they are expected: where nearly all of them are,
+// of all squares and the border, and as blurred as before, that confirms the target as nothing else does.
+bool EdgesDetector::Work::measure_predicted(const cv::Mat& grey, const Predicted& expected, double blur_px) {
+  const ImageFrame frame = frame_of(expected.image_from_plane, Eigen::Vector2d::Zero(), target.size);
+  if (!(blur_px > 0) || smallest_square_px(frame) < kSmallSquare) return false;
+  const auto plane = measure_edges(grey, expected.image_from_plane, blur_px, true);
+  if (plane) take(*plane);
+  return plane.has_value();
+}
+
+std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const Predicted& expected) {
   const Requirement requirement{1, 2, options.min_found, options.min_contrast};
-  auto found = confirmation.confirm(grey, H, std::clamp(radius, 2.0, kPredictionRadius), requirement);
+  auto found = confirmation.confirm(grey, expected.image_from_plane,
+                                    std::clamp(expected.radius, 2.0, kPredictionRadius), requirement);
   if (!found || is_explained(*found)) return found;
   int squares = 0;
   for (size_t i = 0; i < edges.shapes.size(); ++i) {
@@ -188,7 +217,7 @@ std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const 
   }
   if (squares < kLeastSquares) return std::nullopt;
   // Small ones have no room beside them in which another panel's would show.
-  if (smallest_square_px(*found) < kSmallSquare) return std::nullopt;
+  if (smallest_square_px(found->frame) < kSmallSquare) return std::nullopt;
   // Turned in itself by a quarter, the target still shows all of its border and half of its squares.
   for (int quarters = 1; quarters < 4; ++quarters) {
     const Eigen::Matrix3d turned(Eigen::AngleAxisd(quarters * M_PI / 2, Eigen::Vector3d::UnitZ()));
@@ -252,9 +281,8 @@ void EdgesDetector::Work::add_corners(const PlaneMeasurement& plane) {
   }
 }
 
-// Whether a piece lies between the target and the ground.
-bool EdgesDetector::Work::is_outline(const EdgePiece& piece) const {
-  const TargetEdge& edge = edges.edges[static_cast<size_t>(piece.edge)];
+// Whether an edge lies between the target and the ground.
+bool EdgesDetector::Work::is_outline(const TargetEdge& edge) const {
   const TargetShape& shape = edges.shapes[static_cast<size_t>(edge.shape)];
   return shape.kind == ShapeKind::kOutline && !shape.inner;
 }
@@ -278,13 +306,31 @@ void EdgesDetector::Work::share_growth() {
   }
 }
 
+// Whether the whole target is: both ends of each of its own edges.
+bool EdgesDetector::Work::is_all_in_view() const {
+  int ends = 0;
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    if (!on_ground[i]) ends += pieces[i].first + pieces[i].last;
+  }
+  return ends == 2 * own_edges;
+}
+
+// Of the target's own edges: the ground beside its outline may be as pale.
+bool EdgesDetector::Work::is_most_measured() const {
+  const auto own = static_cast<double>(std::ranges::count(on_ground, 0));
+  const auto found =
+      std::ranges::count_if(measured, [&](int i) { return on_ground[static_cast<size_t>(i)] == 0; });
+  return static_cast<double>(found) >= kMostPieces * own;
+}
+
 // By the places of its edges, to a few hundredths of a pixel each.
 std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat& grey,
-                                                                   const Confirmed& found) {
+                                                                   const Eigen::Matrix3d& image_from_plane,
+                                                                   double blur_px, bool is_predicted) {
   PlaneMeasurement plane;
-  Eigen::Matrix3d H = found.image_from_plane;
+  Eigen::Matrix3d H = image_from_plane;
   PlaneFit fit;
-  EdgeFitOptions how{options.lines_per_edge, found.blur, options.min_contrast};
+  EdgeFitOptions how{options.lines_per_edge, blur_px, options.min_contrast};
   double bent = 0;
   const auto fit_widened = [&](double by) {
     for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, by);
@@ -295,7 +341,10 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
     plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
     project_edges(edges, H, camera, kPiece, pieces);
     on_ground.clear();
-    for (const EdgePiece& piece : pieces) on_ground.push_back(is_outline(piece));
+    for (const EdgePiece& piece : pieces)
+      on_ground.push_back(is_outline(edges.edges[static_cast<size_t>(piece.edge)]));
+    if (is_predicted && look == 1 && !is_all_in_view()) return std::nullopt;
+    how.least_measured = is_predicted && look == 1 ? kMostPieces : 0;
     edge_fit.measure(grey, pieces, on_ground, plane.frame, how, offsets, measured);
     if (offsets.size() < 10) return std::nullopt;
     share_growth();
@@ -305,9 +354,8 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
     bent = now_bent;
     H = towards_camera(corrected(H, plane.frame, fit.step));
     const double blur = std::max(std::sqrt(0.5 * edge_fit.blur().trace()), kSharpest);
-    const bool as_expected =
-        std::abs(blur - how.blur) < kSameBlur * blur &&
-        static_cast<double>(measured.size()) >= kMostPieces * static_cast<double>(pieces.size());
+    const bool as_expected = std::abs(blur - how.blur) < kSameBlur * blur && is_most_measured();
+    if (is_predicted && look == 1 && !as_expected) return std::nullopt;
     const double moved = fit.step.norm() * plane.frame.radius * camera.intrinsics()[0];
     is_settled = moved < kStill && (look > 1 || as_expected);
     // What goes on moving is no target.
@@ -323,6 +371,7 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat
   plane.sigma_px = std::sqrt(static_cast<double>(offsets.size()) / weights) * spread;
   plane.rms_px = fit.rms_px;
   plane.growth_px = fit.growth;
+  plane.blur_px = how.blur;
   plane.edges = static_cast<int>(offsets.size());
   for (size_t i = 0; i < offsets.size(); ++i) {
     const EdgePiece& piece = pieces[static_cast<size_t>(measured[i])];
@@ -348,14 +397,17 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_picture(const cv::M
   return plane;
 }
 
-bool EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
+void EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
   std::optional<PlaneMeasurement> plane;
-  if (smallest_square_px(found) < kSmallSquare) plane = measure_picture(grey, found);
-  if (!plane) plane = measure_edges(grey, found);
-  if (!plane) return false;
+  if (smallest_square_px(found.frame) < kSmallSquare) plane = measure_picture(grey, found);
+  if (!plane) plane = measure_edges(grey, found.image_from_plane, found.blur, false);
+  if (plane) take(*plane);
+}
+
+void EdgesDetector::Work::take(const PlaneMeasurement& plane) {
   detection.plane = plane;
-  add_corners(*plane);
-  return true;
+  detection.status = DetectionStatus::kFound;
+  add_corners(plane);
 }
 
 const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<Prediction>& prediction) {
@@ -371,9 +423,11 @@ const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<
   Stopwatch stopwatch(w.detection.stages);
   w.confirmed.clear();
   std::optional<Confirmed> followed;
-  if (prediction) {
-    followed = w.follow(grey, *prediction);
+  if (const auto expected = prediction ? w.predicted(*prediction) : std::nullopt) {
+    const bool is_there = w.measure_predicted(grey, *expected, prediction->blur_px);
+    if (!is_there) followed = w.follow(grey, *expected);
     stopwatch.lap("follow");
+    if (is_there) return w.detection;
   }
   // Where much is missing of what was expected, the whole picture may have something better.
   if (followed && is_explained(*followed)) {
@@ -387,7 +441,7 @@ const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<
     w.detection.status = DetectionStatus::kAmbiguous;
     return w.detection;
   }
-  if (w.measure(grey, w.confirmed.front())) w.detection.status = DetectionStatus::kFound;
+  w.measure(grey, w.confirmed.front());
   stopwatch.lap("measure");
   return w.detection;
 }

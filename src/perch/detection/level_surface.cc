@@ -14,6 +14,9 @@ constexpr size_t kLeastOfPlane = 8, kLeastOfCurved = 24;
 // No light is more even than this: paper, ink and the sensor's rows.
 constexpr double kLeastSpread = 0.2;  // grey levels
 
+// A fit whose spread changes by no more than this part of it has found its weights.
+constexpr double kSettled = 0.05;
+
 // A shadow is looked for where the levels are more uneven than this, and believed where it explains so much
 // that this part of the variance is left: any two levels would explain two thirds.
 constexpr double kUneven = 0.7;  // grey levels
@@ -62,7 +65,9 @@ LevelSurface::Fitted LevelSurface::evenly_lit(std::span<const LevelSample> sampl
       sum += weight * (r * r - variance);
       count += weight;
     }
+    const double before = spread;
     spread = std::max(sum / std::max(count - unknowns, 1.0), kLeastSpread * kLeastSpread);
+    if (round > 0 && std::abs(spread - before) < kSettled * before) break;
   }
   fitted.covariance = A.inverse();
   fitted.covariance.bottomRightCorner(6 - unknowns, 6 - unknowns).setZero();

@@ -115,7 +115,8 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
     return;
   }
   Stopwatch stopwatch(estimate.stages);
-  const auto prediction = predict(frame.timestamp_ns, aid.angles);
+  auto prediction = predict(frame.timestamp_ns, aid.angles);
+  if (prediction) prediction->blur_px = blur_px_;
   const Detection& detection = detector_->detect(frame.grey, follow_ ? prediction : std::nullopt);
   estimate.detect_us = stopwatch.since_lap_us();
   estimate.stages = detection.stages;
@@ -143,6 +144,7 @@ void Estimator::estimate_pose(const Frame& frame, const Aid& aid, Estimate& esti
   estimate.features = pose.features;
   if (estimate.status != EstimateStatus::kOk) return;
   deformation_ = pose.deformation;
+  blur_px_ = detection.plane ? detection.plane->blur_px : 0;
   estimate.camera_from_target = pose.camera_from_target;
   if (knows_camera(frames_, aid.angles))
     estimate.pad_from_body = pad_from_body_by_vision(frames_, pose.camera_from_target, aid.angles);

@@ -52,6 +52,7 @@ class Estimator {
   std::unique_ptr<Detector> detector_;
   PoseEstimator pose_;
   Deformation deformation_;
+  double blur_px_ = 0;  // of the last frame that showed the target; 0: unknown
   VehicleFilter filter_;
 };
 

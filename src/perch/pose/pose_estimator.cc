@@ -28,6 +28,10 @@ constexpr double kNear = 1;
 constexpr double kRough = 0.01;
 constexpr double kInQuestion = 25;
 
+// The same of edges, of the cost itself: in the minimum that is 2 in the mean, and then a thousandth of a
+// deviation squared; in one that is out of question it is large, and need not be known.
+constexpr double kPlaneDone = 1e-4;
+
 // Minima whose rotations are closer than this are one. In the flat valley of a face seen from far and
 // straight on a descent ends up to 6 % of a deviation (the fourth root of kDone) before the bottom.
 constexpr double kSameMinimum = 0.01;  // rad
@@ -94,6 +98,7 @@ PoseEstimator::PoseEstimator(const LandingTarget& target, const CameraModel& cam
   }
   solver_.options.max_num_iterations = options.max_iterations;
   solver_.options.gradient_tolerance = 1e-9;
+  plane_solver_.options.function_tolerance = kPlaneDone;
 }
 
 // The linear seed is the best from near, the infinitesimal poses from far: which one, the pixels tell.
@@ -355,10 +360,12 @@ PoseResult PoseEstimator::estimate(const PlaneMeasurement& measured, std::span<c
   const PlaneCost there(plane, best->camera_from_target.mean);
   there(PlaneCost::Parameters::Zero().eval().data(), residuals.data(), J.data());
   learn(plane.root, J, residuals.squaredNorm(), per_px, result.deformation);
-  softened.information = deformed(measured.information, result.deformation.px2(), per_px);
-  const WhitenedPlane with_own(softened);
-  for (auto* minimum : {&best, &second}) {
-    if (*minimum) *minimum = minimum_at(with_own, (*minimum)->camera_from_target.mean);
+  if (result.deformation.px2() != usual.px2()) {
+    softened.information = deformed(measured.information, result.deformation.px2(), per_px);
+    const WhitenedPlane with_own(softened);
+    for (auto* minimum : {&best, &second}) {
+      if (*minimum) *minimum = minimum_at(with_own, (*minimum)->camera_from_target.mean);
+    }
   }
   if (!best) return result;
   result.reprojection_rms_px = best->rms_px;
