@@ -164,13 +164,16 @@ LevelSurface::Level believed(const EdgeFit::Piece& piece, const LevelSurface& su
 }
 
 // Of the slope of a step of one blur, by least squares, as that of the templates', the level being free: as
-// two Gaussians overlap within the reach.
+// two Gaussians overlap within the reach. Blurs that differ by more than the bounds are for the next look,
+// with other templates.
 double gain_of(double blur, double template_blur, double reach) {
+  constexpr double kLeast = 0.85, kMost = 1.15;
   const double level = 0.5 / reach;
   const auto overlap = [&](double b) {
     return 1 / std::sqrt(2 * M_PI * (b * b + template_blur * template_blur)) - level;
   };
-  return overlap(blur) / overlap(template_blur);
+  const double alike = overlap(template_blur);
+  return alike > 0 ? std::clamp(overlap(blur) / alike, kLeast, kMost) : 1;
 }
 
 struct Step {
