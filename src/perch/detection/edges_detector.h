@@ -29,8 +29,9 @@ EdgesOptions read_edges_options(Section edges);
 
 // Propose, verify, measure: white squares on black, by a fixed threshold and, where that finds nothing, by
 // local contrast, suggest homographies; one that explains all edges that should be seen is a target; their
-// sub-pixel places, through the lens model, are the measurement. With a prediction, the predicted edges are
-// looked for first, and far fewer of them suffice.
+// sub-pixel places, through the lens model, are the measurement. With a prediction, the edges are measured
+// where it puts them, and that nearly all are there confirms the target; else they are looked for about there
+// first, and far fewer of them suffice.
 class EdgesDetector : public Detector {
  public:
   // Throws std::invalid_argument when the target is no layout of squares.
