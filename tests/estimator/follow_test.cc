@@ -289,6 +289,7 @@ Prediction claimed(TestRng& rng, const Rigid3& pose) {
   Prediction prediction{{pose, PoseCovariance::Zero()}};
   const double sigma = std::pow(10, rng.uniform(-3, -1));
   prediction.camera_from_target.covariance.diagonal().setConstant(sigma * sigma);
+  prediction.blur_px = rng.uniform(0.65, 0.85);  // as those scenes are blurred, about
   return prediction;
 }
 

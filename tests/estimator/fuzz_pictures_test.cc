@@ -127,6 +127,7 @@ FuzzPicture random_fuzz(TestRng& rng) {
 std::optional<Prediction> random_prediction(TestRng& rng) {
   if (rng.index(4) == 0) return {};
   Prediction prediction;
+  prediction.blur_px = rng.index(2) == 0 ? 0 : std::exp(rng.uniform(-3, 3));
   prediction.camera_from_target.mean = rng.index(4) == 0 ? rng.pose(5) : random_pose(rng);
   Eigen::Matrix<double, 6, 6> root;
   const double sigma = std::exp(rng.uniform(-12, 5));
