@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "support/child_program.h"
+#include "support/estimates_table.h"
 #include "support/free_port.h"
 #include "support/run_program.h"
 #include "support/temp_folder.h"
@@ -79,17 +80,6 @@ TEST(LivePtz, FollowsThePadThroughASimulatedHead) {
   EXPECT_GT(json["status"]["ok"], json["frames"].get<int>() / 2);
 }
 
-// A recording's table of estimates without the measured times, its last three columns.
-std::string without_times(const std::filesystem::path& file) {
-  std::istringstream text(read_file(file));
-  std::string all;
-  for (std::string line; std::getline(text, line);) {
-    for (int i = 0; i < 3; ++i) line.resize(line.rfind(','));
-    all += line + "\n";
-  }
-  return all;
-}
-
 // 5 m over the pad it fills a quarter of the picture's height at the widest zoom; the poses tell that the
 // lens of each picture's own zoom was used. And the recording gives them again.
 TEST(LivePtz, ZoomsSoThatThePadFillsThePicture) {
@@ -129,7 +119,8 @@ TEST(LivePtz, ZoomsSoThatThePadFillsThePicture) {
       "--config " + (flight / "run/config.yaml").string() + " --output again " + flight.string());
   ASSERT_EQ(again.code, 0) << again.err;
   const std::filesystem::path output = rig.folder / "again" / flight.filename();
-  EXPECT_EQ(without_times(output / "estimates.csv"), without_times(flight / "run/estimates.csv"));
+  EXPECT_EQ(without_times(lines_of(output / "estimates.csv")),
+            without_times(lines_of(flight / "run/estimates.csv")));
   EXPECT_EQ(read_file(output / "states.csv"), read_file(flight / "run/states.csv"));
   EXPECT_GT(right, 0.95 * rows);
 }

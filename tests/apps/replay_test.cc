@@ -10,6 +10,7 @@
 #include "perch/camera/image_source.h"
 #include "perch/flight/flight.h"
 #include "perch/flight/flight_recorder.h"
+#include "support/estimates_table.h"
 #include "support/rng.h"
 #include "support/run_program.h"
 
@@ -25,21 +26,6 @@ constexpr char kSimulation[] =
     " rate_hz: 20}\n"
     "flight: {start_height: 6, start_aside: 1, touchdown_height: 1.5, duration: 2.9, hover: 0}\n";
 constexpr int kUnreadable = 20;  // this frame
-
-std::vector<std::string> lines_of(const fs::path& file) {
-  std::istringstream text(read_file(file));
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(text, line);) lines.push_back(line);
-  return lines;
-}
-
-// estimates.csv but for the measured times, its last three columns.
-std::vector<std::string> without_times(std::vector<std::string> lines) {
-  for (std::string& line : lines) {
-    for (int i = 0; i < 3; ++i) line.resize(line.rfind(','));
-  }
-  return lines;
-}
 
 class Replay : public testing::Test {
  protected:

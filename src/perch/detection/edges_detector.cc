@@ -105,7 +105,6 @@ EdgesOptions read_edges_options(Section edges) {
 struct EdgesDetector::Work {
   LandingTarget target;
   TargetEdges edges;
-  int own_edges = 0;  // without those between the target and the ground
   CameraModel camera;
   EdgesOptions options;
   RegionSearch regions;
@@ -132,7 +131,6 @@ struct EdgesDetector::Work {
         regions(t, edges, c, o.min_found, o.min_contrast),
         confirmation(t, edges, c),
         picture_fit(edges, c) {
-    for (const TargetEdge& edge : edges.edges) own_edges += !is_outline(edge);
     halves.reserve(kMostHalves);
     const CameraModel* last = &camera;
     while (halves.size() < kMostHalves && std::min(last->width(), last->height()) >= kLeastSide) {
@@ -308,11 +306,12 @@ void EdgesDetector::Work::share_growth() {
 
 // Whether the whole target is: both ends of each of its own edges.
 bool EdgesDetector::Work::is_all_in_view() const {
-  int ends = 0;
+  std::ptrdiff_t ends = 0;
   for (size_t i = 0; i < pieces.size(); ++i) {
     if (!on_ground[i]) ends += pieces[i].first + pieces[i].last;
   }
-  return ends == 2 * own_edges;
+  return ends ==
+         2 * std::ranges::count_if(edges.edges, [&](const TargetEdge& edge) { return !is_outline(edge); });
 }
 
 // Of the target's own edges: the ground beside its outline may be as pale.

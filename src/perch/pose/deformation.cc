@@ -24,7 +24,8 @@ void learn(const PlaneInformation& root, const Eigen::Matrix<double, 8, 6>& J, d
   const PlaneInformation M = step_per_px * step_per_px * root.lazyProduct(root.transpose());
   const Eigen::Matrix<double, 8, 6> MJ = M.lazyProduct(J);
   const Eigen::Matrix<double, 6, 6> JtMJ = J.transpose().lazyProduct(MJ);
-  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> normal(Eigen::Matrix<double, 6, 6>(J.transpose().lazyProduct(J)));
+  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> normal(
+      Eigen::Matrix<double, 6, 6>(J.transpose().lazyProduct(J)));
   const double trace = M.trace() - normal.solve(JtMJ).trace();
   // Two squares of unit variance vary by 4 in units of 1 / trace, of which the deformation that is allowed
   // for is a part; the frame's own adds to that: some hundredths of a pixel are no less sure than

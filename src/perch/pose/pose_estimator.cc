@@ -28,8 +28,8 @@ constexpr double kNear = 1;
 constexpr double kRough = 0.01;
 constexpr double kInQuestion = 25;
 
-// The same of edges, of the cost itself: in the minimum that is 2 in the mean, and then a thousandth of a
-// deviation squared; in one that is out of question it is large, and need not be known.
+// The same of edges, as a part of the cost: that of the minimum is 2 in the mean, so no pose moves by more
+// than one or two hundredths of its deviation; one that is out of question costs much, and need not be known.
 constexpr double kPlaneDone = 1e-4;
 
 // Minima whose rotations are closer than this are one. In the flat valley of a face seen from far and
