@@ -18,6 +18,18 @@ constexpr int kLastLines = 6;
 // Nor does a target of which so little can be seen say what it is.
 constexpr int kLeastLines = 12;
 
+// Of the lines across a square: fewer, and it is hidden; more, and it is there.
+constexpr double kHidden = 0.2, kThere = 0.8;
+
+// Of the lines of a first look that makes a second one needless.
+constexpr double kPlain = 0.95;
+
+// Found steps are where they should be, not only near, if they are not farther off than this.
+constexpr double kInPlace = 0.8;  // px
+
+// Squares smaller than this are measured by their picture.
+constexpr double kSmallSquare = 7;  // px
+
 // Of values, at least one, which it puts into another order.
 double median(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -58,6 +70,28 @@ Confirmation::Confirmation(const LandingTarget& target, const TargetEdges& edges
   }
 }
 
+bool Confirmation::has_small_squares(const ImageFrame& frame) const {
+  return 2 * frame.radius * camera_.intrinsics()[0] * smallest_[0] < kSmallSquare * size_;
+}
+
+// Whether the last look shows the target as a whole, and nearly all of it where it should be.
+bool Confirmation::is_plain(const ImageFrame& frame, int lines) const {
+  if (has_small_squares(frame)) return false;
+  const auto is_ground = [&](size_t edge) {
+    const TargetShape& shape = target_.shapes[edge / 4];
+    return shape.kind == ShapeKind::kOutline && !shape.inner;
+  };
+  int asked = 0, found = 0;
+  for (size_t i = 0; i < tallies_.size(); ++i) {
+    if (is_ground(i)) continue;
+    if (!target_.shapes[i / 4].inner && tallies_[i].asked < lines) return false;
+    asked += tallies_[i].asked;
+  }
+  for (size_t i = 0; i < offsets_.size(); ++i)
+    found += !is_ground(static_cast<size_t>(steps_[i].edge)) && std::abs(offsets_[i].left) < kInPlace;
+  return found >= kPlain * asked;
+}
+
 bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const Requirement& requirement) {
   // Edges too short or too near each other to be told apart are judged by the grey beside them.
   const auto is_unsure = [](const EdgeTally& tally) { return tally.asked < 2; };
@@ -65,10 +99,14 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
   if (std::ranges::any_of(tallies_, is_unsure)) {
     grey_order_.judge_edges(grey, H, requirement.contrast, in_order_);
   }
-  int squares = 0, border_edges = 0, holes = 0, holes_asked = 0, asked = 0, found = 0;
+  // Of all edges that can be told: whether any is missing; whether two of each square's are there.
+  bool is_faultless = true;
+  partly_ = 0;
+  int squares = 0, all_squares = 0, complete = 0, border_edges = 0;
+  int holes = 0, holes_asked = 0, asked = 0, found = 0;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
     const ShapeKind kind = target_.shapes[i].kind;
-    int known = 0, seen = 0;
+    int known = 0, seen = 0, lines = 0, lines_found = 0;
     for (size_t k = 4 * i; k < 4 * i + 4; ++k) {
       const EdgeTally& tally = tallies_[k];
       // The ground beside the outline may be as pale: nobody can ask for that.
@@ -76,6 +114,8 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
         found += tally.found;
         asked += tally.asked;
       }
+      lines += tally.asked;
+      lines_found += tally.found;
       const EdgeTally& judged = is_unsure(tally) ? in_order_[k] : tally;
       if (judged.asked == 0) continue;
       ++known;
@@ -84,9 +124,13 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
     seen_[i] = seen >= 3 || (known == 2 && seen == 2);
     if (kind == ShapeKind::kSquare) {
       squares += seen_[i];
+      complete += seen >= 2;
+      partly_ += lines_found > kHidden * lines && lines_found < kThere * lines;
+      ++all_squares;
     } else {
       border_edges += seen;
     }
+    if (kind != ShapeKind::kOutline) is_faultless = is_faultless && seen == known;
     if (kind == ShapeKind::kHole) {
       holes += seen;
       holes_asked += known;
@@ -94,14 +138,32 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
   }
   // Without the hole it is the other one of the two targets.
   if (holes_asked >= 3 && 2 * holes < holes_asked) return false;
-  return squares >= requirement.squares && border_edges >= requirement.border_edges && asked >= kLeastLines &&
+  // So near that less of the border is in the picture, all squares are, or all but one and a side of it.
+  const bool is_within =
+      is_faultless && complete + std::min(border_edges, 1) >= all_squares && found >= kPlain * asked;
+  const bool is_border_met = border_edges >= requirement.border_edges || is_within;
+  own_ = asked > 0 ? static_cast<double>(found) / asked : 0;
+  return squares >= requirement.squares && is_border_met && asked >= kLeastLines &&
          found >= requirement.found * asked;
 }
 
+// Whether edges mostly are wholly there or not at all: in noise that hides some, it hides parts of all.
+bool Confirmation::is_clear() const {
+  constexpr int kLeastAsked = 4, kLeastEdges = 12;
+  constexpr double kClear = 0.8;
+  int edges = 0, clear = 0;
+  for (const EdgeTally& tally : tallies_) {
+    if (tally.asked < kLeastAsked) continue;
+    ++edges;
+    clear += tally.found <= 1 || tally.found + 1 >= tally.asked;
+  }
+  return edges >= kLeastEdges && clear >= kClear * edges;
+}
+
 // Whether all lines across all four edges show them where they should be.
-bool Confirmation::is_whole(size_t shape) const {
-  return std::ranges::all_of(std::span(tallies_).subspan(4 * shape, 4), [](const EdgeTally& tally) {
-    return tally.asked >= kLastLines && tally.found == tally.asked;
+bool Confirmation::is_whole(size_t shape, int lines) const {
+  return std::ranges::all_of(std::span(tallies_).subspan(4 * shape, 4), [&](const EdgeTally& tally) {
+    return tally.asked >= lines && tally.found == tally.asked;
   });
 }
 
@@ -248,33 +310,42 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
       return std::nullopt;
     fit = fit_plane(offsets_, result.frame, 0.3, last ? 2 : 3);
     H = towards_camera(corrected(H, result.frame, fit.step));
-    if (last) break;
+    result.by_one_look = requirement.is_measured_after && round == 0 && is_plain(result.frame, search.lines);
+    if (last || result.by_one_look) break;
     const double moved = fit.step.norm() * result.frame.radius * camera_.intrinsics()[0];
     if (moved < kNearEnough || round + 2 == kMaxRounds) search.lines = kLastLines;
   }
-  // What is found must be where it should be, not only near.
   widths_.clear();
   result.contrast = median_contrast(steps_);
   for (EdgeTally& tally : tallies_) tally.found = 0;
   for (size_t i = 0; i < offsets_.size(); ++i) {
-    const EdgeOffset& o = offsets_[i];
-    const double left = o.offset - o.jacobian.dot(fit.step) - o.white * fit.growth;
-    if (std::abs(left) > 0.8 || steps_[i].contrast < kLeastOfContrast * result.contrast) continue;
+    if (std::abs(offsets_[i].left) > kInPlace || steps_[i].contrast < kLeastOfContrast * result.contrast)
+      continue;
     ++tallies_[static_cast<size_t>(steps_[i].edge)].found;
     widths_.push_back(steps_[i].width);
   }
   const Eigen::Matrix3d& H = result.image_from_plane;
-  if (!is_met(grey, H, requirement)) return std::nullopt;
-  for (size_t i = 0; i < target_.shapes.size() && !contradicted_; ++i) {
-    contradicted_ = target_.shapes[i].kind == ShapeKind::kSquare && !is_whole(i) &&
-                    is_beside(grey, H, target_.shapes[i], result.contrast);
-  }
-  if (contradicted_ || !is_layout(grey, H)) return std::nullopt;
   for (const EdgeTally& tally : tallies_) {
     result.found += tally.found;
     result.asked += tally.asked;
   }
+  if (!is_met(grey, H, requirement)) {
+    contradicted_ = is_clear();
+    return std::nullopt;
+  }
+  for (size_t i = 0; i < target_.shapes.size() && !contradicted_; ++i) {
+    contradicted_ = target_.shapes[i].kind == ShapeKind::kSquare && !is_whole(i, search.lines) &&
+                    is_beside(grey, H, target_.shapes[i], result.contrast);
+  }
+  contradicted_ = contradicted_ || !is_layout(grey, H);
+  if (contradicted_) return std::nullopt;
+  if (result.by_one_look) {  // as many as a second look has
+    result.found *= kLastLines / search.lines;
+    result.asked *= kLastLines / search.lines;
+  }
   result.seen = seen_;
+  result.own = own_;
+  result.partly = partly_;
   result.blur = std::clamp(median(widths_), 0.5, 3.0);
   return result;
 }

@@ -20,9 +20,12 @@ struct Confirmed {
   Eigen::Matrix3d image_from_plane = Eigen::Matrix3d::Identity();
   ImageFrame frame;
   int found = 0, asked = 0;       // lines
+  double own = 0;                 // part found of those not across the outline: the ground may be as pale
+  int partly = 0;                 // squares that are neither there nor hidden
   double blur = 0.8;              // deviation across edges, px
   double contrast = 0;            // median of the steps, grey levels
   std::bitset<kMostShapes> seen;  // by shape: enough of its edges are
+  bool by_one_look = false;       // see Requirement
   double score() const { return 2.0 * found - asked; }
 };
 
@@ -32,6 +35,9 @@ struct Requirement {
   int border_edges = 2;  // sides of the border's edges, or of the hole's
   double found = 0.5;    // of the lines across squares and the border's inner edge
   double contrast = 12;  // grey levels
+  // Whether one look will do where it finds nearly all of a target that is in view as a whole, as its edges
+  // will be measured, which says more than a second look.
+  bool is_measured_after = false;
 };
 
 // Of the median contrast: what is less is noise, not an edge in the shadow.
@@ -53,12 +59,18 @@ class Confirmation {
   std::optional<Confirmed> confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                    double radius, const Requirement& requirement);
 
-  // Whether the last picture was clearly that of another panel: its squares lie beside the places of ours.
+  // Whether the last picture was clearly that of another panel: squares lie beside the places of ours or are
+  // missing, or there are edges enough that are not ours.
   bool is_contradicted() const { return contradicted_; }
 
+  // Whether the target's smallest squares are too small for their edges to be told apart.
+  bool has_small_squares(const ImageFrame& frame) const;
+
  private:
+  bool is_plain(const ImageFrame& frame, int lines) const;
   bool is_met(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, const Requirement& requirement);
-  bool is_whole(size_t shape) const;
+  bool is_clear() const;
+  bool is_whole(size_t shape, int lines) const;
   std::optional<SquareLevels> levels_of(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                         const TargetShape& square) const;
   std::optional<int> grey_at(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
@@ -70,7 +82,9 @@ class Confirmation {
   TargetEdges target_;
   CameraModel camera_;
   GreyOrder grey_order_;
-  double size_;                       // m
+  double size_;     // m
+  double own_ = 0;  // as in Confirmed
+  int partly_ = 0;
   std::array<double, 2> smallest_{};  // square of the target, of the nested one in it, m
   bool contradicted_ = false;
   std::vector<EdgePiece> pieces_;

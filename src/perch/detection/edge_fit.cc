@@ -176,6 +176,13 @@ double gain_of(double blur, double template_blur, double reach) {
   return alike > 0 ? std::clamp(overlap(blur) / alike, kLeast, kMost) : 1;
 }
 
+// Up to where the next edge's blur begins, and not farther than the step's own reaches.
+double reach_of(const EdgePiece& piece, double blur_px) {
+  const double cosine = piece.normal.cwiseAbs().maxCoeff();
+  const double room = std::min(piece.white_room, piece.black_room) - 2 * blur_px;
+  return std::min(std::min(room, kLevel * blur_px) / cosine, kLargestReach);
+}
+
 struct Step {
   double offset = 0, sigma = 0;  // along the line, px
   double contrast = 0;
@@ -213,12 +220,14 @@ Step solve(const EdgeFit::Piece& piece, const LevelSurface::Level& white, const 
 EdgeFit::EdgeFit() = default;
 EdgeFit::~EdgeFit() = default;
 
+bool EdgeFit::has_room(const EdgePiece& piece, double blur_px) {
+  return reach_of(piece, blur_px) >= kLeastReach;
+}
+
 bool EdgeFit::fit(const cv::Mat& grey, const EdgePiece& piece, const EdgeFitOptions& options,
                   Piece& fitted) const {
   const double cosine = piece.normal.cwiseAbs().maxCoeff(), sine = piece.normal.cwiseAbs().minCoeff();
-  // Up to where the next edge's blur begins, and not farther than the step's own reaches.
-  const double room = std::min(piece.white_room, piece.black_room) - 2 * options.blur;
-  const double reach = std::min(std::min(room, kLevel * options.blur) / cosine, kLargestReach);
+  const double reach = reach_of(piece, options.blur);
   if (reach < kLeastReach) return false;
   const CrossingLines lines(piece, 2.5 * options.blur + sine * reach * 0.5);
   const int count = lines.last() - lines.first() + 1;

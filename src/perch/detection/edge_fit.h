@@ -41,6 +41,9 @@ class EdgeFit {
                const ImageFrame& frame, const EdgeFitOptions& options, std::vector<EdgeOffset>& offsets,
                std::vector<int>& pieces_measured);
 
+  // Whether the next edge is so far from a piece that its blur leaves enough of the step.
+  static bool has_room(const EdgePiece& piece, double blur_px);
+
   const Eigen::Matrix2d& blur() const { return blur_; }  // as in edge_blur.h
 
   struct Piece;

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "perch/detection/confirm.h"
-#include "perch/detection/edge_fit.h"
+#include "perch/detection/edges_measurement.h"
 #include "perch/detection/grey_range.h"
 #include "perch/detection/local_contrast.h"
 #include "perch/detection/local_mean.h"
@@ -16,16 +16,6 @@
 
 namespace perch {
 namespace {
-
-// By what the sigmas of so many offsets are to be multiplied, whose scatter about the fit is `scale` sigmas.
-// Where they scatter less, as the noise of the dark is not that of an edge's middle, the fit has taken a part
-// of the scatter, and a few tell it roughly.
-double spread_of(double scale, size_t offsets) {
-  constexpr double kFitted = 9, kBelieved = 30;
-  if (scale >= 1) return scale;
-  const auto n = static_cast<double>(offsets);
-  return std::min(1.0, std::sqrt((n * scale * scale + kBelieved) / (n + kBelieved - kFitted)));
-}
 
 // Regions of fewer sampled pixels are noise.
 constexpr int kLeastPixels = 3;
@@ -47,24 +37,8 @@ constexpr double kPredictionRadius = 10;  // px, beyond which the whole picture 
 // Found edges of those asked for: what explains as many where it was expected needs no rival.
 constexpr double kExplained = 0.85;
 
-// A piece of an edge for the fine fit: an arc over this length is a parabola to a hundredth of a pixel.
-constexpr double kPiece = 32;  // px
-
-// A first look at the edges is the last where it moves none of them by more than this, finds the blur that
-// was expected, to a part of it, and at least this part of the pieces of the target's own edges.
-constexpr double kStill = 0.3;  // px
-constexpr double kSameBlur = 0.15, kMostPieces = 0.9;
-constexpr int kMostLooks = 3;
-
-// How far a fit to a blurred step is off one bent by the sensor's response differs by its reach: by this part
-// of the growth.
-constexpr double kBent = 0.1;
-
-// No lens is sharper, its pixels included; what seems to be is drawn without a lens.
-constexpr double kSharpest = 0.45;  // px
-
-// Squares smaller than this are measured by their picture.
-constexpr double kSmallSquare = 7;  // px
+// Found edges of the target's own of a small one whose picture is not what it should be.
+constexpr double kMostlyThere = 0.78;
 
 // The picture at half the size of the one before, where noise and blur are half as large.
 struct Level {
@@ -79,6 +53,12 @@ struct Predicted {
   double radius = 0;  // px that its edges may be off, as it claims
 };
 
+// One that is in view as a whole and has not the target's picture lies in a shadow or glare, is covered in
+// part, or is another panel, of whose squares many lie half on the places of ours.
+bool is_sure(const Confirmed& found) {
+  return found.own >= kExplained || (found.own >= kMostlyThere && found.partly <= 1);
+}
+
 bool is_explained(const Confirmed& found) { return found.found >= kExplained * found.asked; }
 
 // The camera that takes the picture at half the size: pixel x covers 2 x and 2 x + 1.
@@ -91,17 +71,6 @@ CameraModel halved(const CameraModel& camera) {
 
 }  // namespace
 
-EdgesOptions read_edges_options(Section edges) {
-  EdgesOptions o;
-  edges.read("threshold_fraction", o.threshold_fraction, kFraction);
-  edges.read("lines_per_edge", o.lines_per_edge, Range{1, 100000});
-  edges.read("min_contrast", o.min_contrast, Range{1, 255});
-  edges.read("min_found", o.min_found, kFraction);
-  edges.read("systematic_px", o.systematic_px, Range{0, 10});
-  edges.done();
-  return o;
-}
-
 struct EdgesDetector::Work {
   LandingTarget target;
   TargetEdges edges;
@@ -109,7 +78,7 @@ struct EdgesDetector::Work {
   EdgesOptions options;
   RegionSearch regions;
   Confirmation confirmation;
-  EdgeFit edge_fit;
+  EdgesMeasurement edges_measurement;
   PictureFit picture_fit;
   Detection detection;
 
@@ -118,10 +87,6 @@ struct EdgesDetector::Work {
   LocalMean local_mean;
   std::vector<Level> halves;
   std::vector<Confirmed> confirmed;
-  std::vector<EdgePiece> pieces;
-  std::vector<EdgeOffset> offsets;
-  std::vector<int> measured;
-  std::vector<uint8_t> on_ground;
 
   Work(const LandingTarget& t, const CameraModel& c, const EdgesOptions& o)
       : target(t),
@@ -130,6 +95,7 @@ struct EdgesDetector::Work {
         options(o),
         regions(t, edges, c, o.min_found, o.min_contrast),
         confirmation(t, edges, c),
+        edges_measurement(edges, t.size, c, o),
         picture_fit(edges, c) {
     halves.reserve(kMostHalves);
     const CameraModel* last = &camera;
@@ -145,13 +111,6 @@ struct EdgesDetector::Work {
   std::optional<Predicted> predicted(const Prediction& prediction) const;
   bool measure_predicted(const cv::Mat& grey, const Predicted& expected, double blur_px);
   std::optional<Confirmed> follow(const cv::Mat& grey, const Predicted& expected);
-  bool is_outline(const TargetEdge& edge) const;
-  double smallest_square_px(const ImageFrame& frame) const;
-  void share_growth();
-  bool is_all_in_view() const;
-  bool is_most_measured() const;
-  std::optional<PlaneMeasurement> measure_edges(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
-                                                double blur_px, bool is_predicted);
   std::optional<PlaneMeasurement> measure_picture(const cv::Mat& grey, const Confirmed& found);
   void measure(const cv::Mat& grey, const Confirmed& found);
   void take(const PlaneMeasurement& plane);
@@ -171,12 +130,6 @@ EdgesDetector::EdgesDetector(const LandingTarget& target, const CameraModel& cam
 }
 
 EdgesDetector::~EdgesDetector() = default;
-
-double EdgesDetector::Work::smallest_square_px(const ImageFrame& frame) const {
-  double smallest = target.size;
-  for (const TargetShape& shape : edges.shapes) smallest = std::min(smallest, shape.side);
-  return 2 * frame.radius * camera.intrinsics()[0] * smallest / target.size;
-}
 
 std::optional<Predicted> EdgesDetector::Work::predicted(const Prediction& prediction) const {
   const auto& [mean, covariance] = prediction.camera_from_target;
@@ -198,8 +151,9 @@ std::optional<Predicted> EdgesDetector::Work::predicted(const Prediction& predic
 // of all squares and the border, and as blurred as before, that confirms the target as nothing else does.
 bool EdgesDetector::Work::measure_predicted(const cv::Mat& grey, const Predicted& expected, double blur_px) {
   const ImageFrame frame = frame_of(expected.image_from_plane, Eigen::Vector2d::Zero(), target.size);
-  if (!(blur_px > 0) || smallest_square_px(frame) < kSmallSquare) return false;
-  const auto plane = measure_edges(grey, expected.image_from_plane, blur_px, true);
+  if (!(blur_px > 0) || confirmation.has_small_squares(frame)) return false;
+  const auto plane =
+      edges_measurement.measure(grey, expected.image_from_plane, blur_px, true, detection.residuals);
   if (plane) take(*plane);
   return plane.has_value();
 }
@@ -215,7 +169,7 @@ std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const 
   }
   if (squares < kLeastSquares) return std::nullopt;
   // Small ones have no room beside them in which another panel's would show.
-  if (smallest_square_px(found->frame) < kSmallSquare) return std::nullopt;
+  if (confirmation.has_small_squares(found->frame)) return std::nullopt;
   // Turned in itself by a quarter, the target still shows all of its border and half of its squares.
   for (int quarters = 1; quarters < 4; ++quarters) {
     const Eigen::Matrix3d turned(Eigen::AngleAxisd(quarters * M_PI / 2, Eigen::Vector3d::UnitZ()));
@@ -231,7 +185,19 @@ void EdgesDetector::Work::search(const cv::Mat& grey, Stopwatch& stopwatch) {
   detection.threshold = level;
   segment(grey, level, 2, kLeastPixels, segmentation);
   stopwatch.lap("segmentation");
-  regions.search(grey, segmentation, {.row_step = 2}, stopwatch, confirmed);
+  regions.search(grey, segmentation, {.row_step = 2, .is_measured_after = true}, stopwatch, confirmed);
+  if (std::ranges::any_of(confirmed, &Confirmed::by_one_look)) {
+    const Confirmed& found = confirmed.front();
+    const bool is_one = confirmed.size() == 1;
+    const auto plane = is_one ? edges_measurement.measure(grey, found.image_from_plane, found.blur, true,
+                                                          detection.residuals)
+                              : std::nullopt;
+    if (plane) take(*plane);
+    stopwatch.lap("measure");
+    if (plane) return;
+    confirmed.clear();
+    regions.search(grey, segmentation, {.row_step = 2}, stopwatch, confirmed);
+  }
   if (!confirmed.empty()) return;
   contrast.threshold(grey, options.min_contrast, segmentation.image);
   segment_runs(kLeastPixels, segmentation);
@@ -279,107 +245,6 @@ void EdgesDetector::Work::add_corners(const PlaneMeasurement& plane) {
   }
 }
 
-// Whether an edge lies between the target and the ground.
-bool EdgesDetector::Work::is_outline(const TargetEdge& edge) const {
-  const TargetShape& shape = edges.shapes[static_cast<size_t>(edge.shape)];
-  return shape.kind == ShapeKind::kOutline && !shape.inner;
-}
-
-// How much of the growth each edge has. The outline's step is from a ground of any grey: what a response that
-// is not linear does to it is less by its smaller modulation, from a dark ground to a pale one by the power
-// 1.25 of it for sRGB; what light spread in the lens does is not.
-void EdgesDetector::Work::share_growth() {
-  const auto by_ground = [&](size_t i) { return on_ground[static_cast<size_t>(measured[i])] != 0; };
-  double sum = 0, count = 0;
-  for (size_t i = 0; i < offsets.size(); ++i) {
-    if (by_ground(i)) continue;
-    sum += offsets[i].modulation;
-    count += 1;
-  }
-  for (size_t i = 0; i < offsets.size(); ++i) {
-    if (!by_ground(i)) continue;
-    const double part = std::min(offsets[i].modulation * count / std::max(sum, 1e-9), 1.0);
-    offsets[i].white = -std::pow(part, 1.25);
-    offsets[i].outline = -1;
-  }
-}
-
-// Whether the whole target is: both ends of each of its own edges.
-bool EdgesDetector::Work::is_all_in_view() const {
-  std::ptrdiff_t ends = 0;
-  for (size_t i = 0; i < pieces.size(); ++i) {
-    if (!on_ground[i]) ends += pieces[i].first + pieces[i].last;
-  }
-  return ends ==
-         2 * std::ranges::count_if(edges.edges, [&](const TargetEdge& edge) { return !is_outline(edge); });
-}
-
-// Of the target's own edges: the ground beside its outline may be as pale.
-bool EdgesDetector::Work::is_most_measured() const {
-  const auto own = static_cast<double>(std::ranges::count(on_ground, 0));
-  const auto found =
-      std::ranges::count_if(measured, [&](int i) { return on_ground[static_cast<size_t>(i)] == 0; });
-  return static_cast<double>(found) >= kMostPieces * own;
-}
-
-// By the places of its edges, to a few hundredths of a pixel each.
-std::optional<PlaneMeasurement> EdgesDetector::Work::measure_edges(const cv::Mat& grey,
-                                                                   const Eigen::Matrix3d& image_from_plane,
-                                                                   double blur_px, bool is_predicted) {
-  PlaneMeasurement plane;
-  Eigen::Matrix3d H = image_from_plane;
-  PlaneFit fit;
-  EdgeFitOptions how{options.lines_per_edge, blur_px, options.min_contrast};
-  double bent = 0;
-  const auto fit_widened = [&](double by) {
-    for (EdgeOffset& o : offsets) o.sigma = std::hypot(o.sigma, by);
-    fit = fit_plane(offsets, plane.frame, 0.3, 3);
-  };
-  bool is_settled = false;
-  for (int look = 1; !is_settled && look <= kMostLooks; ++look) {
-    plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
-    project_edges(edges, H, camera, kPiece, pieces);
-    on_ground.clear();
-    for (const EdgePiece& piece : pieces)
-      on_ground.push_back(is_outline(edges.edges[static_cast<size_t>(piece.edge)]));
-    if (is_predicted && look == 1 && !is_all_in_view()) return std::nullopt;
-    how.least_measured = is_predicted && look == 1 ? kMostPieces : 0;
-    edge_fit.measure(grey, pieces, on_ground, plane.frame, how, offsets, measured);
-    if (offsets.size() < 10) return std::nullopt;
-    share_growth();
-    fit_widened(std::hypot(options.systematic_px, bent));
-    const double now_bent = kBent * std::abs(fit.growth);
-    if (now_bent > bent + options.systematic_px) fit_widened(std::sqrt(now_bent * now_bent - bent * bent));
-    bent = now_bent;
-    H = towards_camera(corrected(H, plane.frame, fit.step));
-    const double blur = std::max(std::sqrt(0.5 * edge_fit.blur().trace()), kSharpest);
-    const bool as_expected = std::abs(blur - how.blur) < kSameBlur * blur && is_most_measured();
-    if (is_predicted && look == 1 && !as_expected) return std::nullopt;
-    const double moved = fit.step.norm() * plane.frame.radius * camera.intrinsics()[0];
-    is_settled = moved < kStill && (look > 1 || as_expected);
-    // What goes on moving is no target.
-    if (look == kMostLooks && moved > 0.5 * blur) return std::nullopt;
-    how.blur = blur;
-  }
-  plane.frame = frame_of(H, Eigen::Vector2d::Zero(), target.size);
-  plane.image_from_plane = H;
-  const double spread = spread_of(fit.scale, offsets.size());
-  plane.information = fit.information / (spread * spread);
-  double weights = 0;
-  for (const EdgeOffset& o : offsets) weights += o.weight / (o.sigma * o.sigma);
-  plane.sigma_px = std::sqrt(static_cast<double>(offsets.size()) / weights) * spread;
-  plane.rms_px = fit.rms_px;
-  plane.growth_px = fit.growth;
-  plane.blur_px = how.blur;
-  plane.edges = static_cast<int>(offsets.size());
-  for (size_t i = 0; i < offsets.size(); ++i) {
-    const EdgePiece& piece = pieces[static_cast<size_t>(measured[i])];
-    detection.residuals.push_back(
-        {piece.middle.cast<float>(), piece.normal.cast<float>(), static_cast<float>(offsets[i].left)});
-  }
-  return plane;
-}
-
 // By the grey levels of its picture, where its edges cannot be told apart.
 std::optional<PlaneMeasurement> EdgesDetector::Work::measure_picture(const cv::Mat& grey,
                                                                      const Confirmed& found) {
@@ -398,8 +263,11 @@ std::optional<PlaneMeasurement> EdgesDetector::Work::measure_picture(const cv::M
 
 void EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
   std::optional<PlaneMeasurement> plane;
-  if (smallest_square_px(found.frame) < kSmallSquare) plane = measure_picture(grey, found);
-  if (!plane) plane = measure_edges(grey, found.image_from_plane, found.blur, false);
+  const bool is_small = confirmation.has_small_squares(found.frame);
+  if (is_small) plane = measure_picture(grey, found);
+  if (is_small && !plane && !is_sure(found) && edges_measurement.is_in_view(found.image_from_plane)) return;
+  if (!plane)
+    plane = edges_measurement.measure(grey, found.image_from_plane, found.blur, false, detection.residuals);
   if (plane) take(*plane);
 }
 
@@ -433,6 +301,7 @@ const Detection& EdgesDetector::detect(const cv::Mat& grey, const std::optional<
     w.confirmed.push_back(*followed);
   } else {
     w.search(grey, stopwatch);
+    if (w.detection.status == DetectionStatus::kFound) return w.detection;
     if (followed && w.confirmed.empty()) w.confirmed.push_back(*followed);
   }
   if (w.confirmed.empty()) return w.detection;

@@ -94,6 +94,30 @@ const Hypotheses::Mark* Hypotheses::mark(size_t quad) {
   return m.seen ? &m : nullptr;
 }
 
+void Hypotheses::begin_group(std::span<const size_t> members) {
+  by_x_.clear();
+  for (const size_t i : members) {
+    if (mark(i)) by_x_.push_back(i);
+  }
+  std::ranges::sort(by_x_, {}, [this](size_t i) { return marks_[i].centre.x(); });
+}
+
+// The nearest to a place of those near whose sides are within bounds.
+std::optional<size_t> Hypotheses::nearest_to(const Eigen::Vector2d& place, double reach,
+                                             const SideBounds& side) const {
+  std::optional<size_t> found;
+  double nearest = reach * reach;
+  for (auto it = std::ranges::lower_bound(near_, place.x() - reach, {}, &Near::x);
+       it != near_.end() && it->x < place.x() + reach; ++it) {
+    const double distance = (Eigen::Vector2d(it->x, it->y) - place).squaredNorm();
+    if (distance < nearest && it->side_px < side.high && it->side_px > side.low) {
+      nearest = distance;
+      found = it->quad;
+    }
+  }
+  return found;
+}
+
 // The nearest region about where each square of the layout should be, if it is of about its size.
 void Hypotheses::match(int scale, const Eigen::Matrix3d& H, double tolerance) {
   matches_.clear();
@@ -103,33 +127,34 @@ void Hypotheses::match(int scale, const Eigen::Matrix3d& H, double tolerance) {
     const Eigen::Vector2d centre = p.hnormalized();
     const Eigen::Matrix2d by_q = (H.topLeftCorner<2, 2>() - centre * H.row(2).head<2>()) / p.z();
     const double side_px = std::sqrt(std::abs(by_q.determinant())) * square.side / px_;
-    double nearest = tolerance * std::sqrt(by_q.col(0).norm() * by_q.col(1).norm()) * square.side + px_;
-    nearest *= nearest;
-    Match found{&square, quads_.size()};
-    for (const size_t i : near_) {
-      const double distance = (marks_[i].centre - centre).squaredNorm();
-      const double side = quads_[i].side_px;
-      if (distance < nearest && side < 1.8 * side_px + 2 && side > 0.5 * side_px - 1.5) {
-        nearest = distance;
-        found.quad = i;
-      }
-    }
-    if (found.quad < quads_.size()) matches_.push_back(found);
+    const double reach = tolerance * std::sqrt(by_q.col(0).norm() * by_q.col(1).norm()) * square.side + px_;
+    const auto nearest = nearest_to(centre, reach, {0.5 * side_px - 1.5, 1.8 * side_px + 2});
+    if (nearest) matches_.push_back({&square, *nearest});
   }
 }
 
 // Three squares, or two with eight corners.
-bool Hypotheses::is_enough() const {
-  return matches_.size() >= 3 || (matches_.size() == 2 && std::ranges::all_of(matches_, [&](const Match& m) {
-                                    return quads_[m.quad].four_sided && quads_[m.quad].side_px >= kByCorners;
-                                  }));
+bool Hypotheses::is_enough(std::span<const Match> matches) const {
+  return matches.size() >= 3 || (matches.size() == 2 && std::ranges::all_of(matches, [&](const Match& m) {
+                                   return quads_[m.quad].four_sided && quads_[m.quad].side_px >= kByCorners;
+                                 }));
+}
+
+// Those that the picture's edge cuts last; how many it does not.
+size_t Hypotheses::sort_cut() {
+  const auto cut = std::ranges::partition(matches_, [&](const Match& m) { return !quads_[m.quad].cut; });
+  return matches_.size() - cut.size();
 }
 
 // The homography that fits best to the matched squares.
 std::optional<Eigen::Matrix3d> Hypotheses::fitted(const Eigen::Matrix3d& H) {
   plane_.clear();
   image_.clear();
-  for (const auto& [square, quad] : matches_) {
+  // What is seen of one that is cut has another centre and other corners: it counts where there is little
+  // else.
+  std::span<const Match> used(matches_.data(), sort_cut());
+  if (!is_enough(used)) used = matches_;
+  for (const auto& [square, quad] : used) {
     const Mark& m = marks_[quad];
     plane_.push_back(square->centre);
     image_.push_back(m.centre);
@@ -154,7 +179,7 @@ std::optional<Eigen::Matrix3d> Hypotheses::fitted(const Eigen::Matrix3d& H) {
       image_.push_back(m.corners[(k + turn) % 4]);
     }
   }
-  const bool corners_seen = plane_.size() > matches_.size();
+  const bool corners_seen = plane_.size() > used.size();
   return corners_seen ? homography_from_points(plane_, image_) : by_centres();
 }
 
@@ -184,7 +209,7 @@ std::optional<Hypothesis> Hypotheses::refined(int scale, const Eigen::Matrix3d& 
   Eigen::Matrix3d H = first;
   for (const double tolerance : {0.45, 0.3}) {  // of a square's side
     match(scale, H, tolerance);
-    if (!is_enough()) return std::nullopt;
+    if (!is_enough(matches_)) return std::nullopt;
     const auto better = fitted(H);
     if (!better) return std::nullopt;
     H = towards_camera(*better);
@@ -192,7 +217,7 @@ std::optional<Hypothesis> Hypotheses::refined(int scale, const Eigen::Matrix3d& 
   return Hypothesis{H, static_cast<int>(matches_.size())};
 }
 
-void Hypotheses::of_seed(size_t seed, std::span<const size_t> members, std::vector<Hypothesis>& hypotheses) {
+void Hypotheses::of_seed(size_t seed, std::vector<Hypothesis>& hypotheses) {
   hypotheses.clear();
   const WhiteQuad& quad = quads_[seed];
   const Mark* own = mark(seed);
@@ -200,12 +225,12 @@ void Hypotheses::of_seed(size_t seed, std::span<const size_t> members, std::vect
   near_.clear();
   // At 75 degrees a square looks half as large as it is long, and the farthest ones of the paper's layout are
   // six sides of a small one apart; the largest is 2.5 times as large as the smallest.
-  for (const size_t i : members) {
+  for (const size_t i : by_x_) {
     const double distance = (quads_[i].seen.centre - quad.seen.centre).squaredNorm();
     const double side = quads_[i].side_px;
     if (distance < std::pow(14 * quad.side_px, 2) && side < 4 * quad.side_px + 2 &&
-        4 * side > quad.side_px - 2 && mark(i)) {
-      near_.push_back(i);
+        4 * side > quad.side_px - 2) {
+      near_.push_back({marks_[i].centre.x(), marks_[i].centre.y(), side, i});
     }
   }
   if (near_.size() < 2) return;

@@ -29,9 +29,11 @@ class Hypotheses {
 
   // The regions of a picture, which must outlive the calls below.
   void begin(std::span<const WhiteQuad> quads);
-  // All those with the region `seed` as one of their squares and two more of `members` at least, or one whose
+  // The regions that may belong to one target, as indices.
+  void begin_group(std::span<const size_t> members);
+  // All those with the region `seed` as one of their squares and two more of the group at least, or one whose
   // corners are measured too, the best first.
-  void of_seed(size_t seed, std::span<const size_t> members, std::vector<Hypothesis>& hypotheses);
+  void of_seed(size_t seed, std::vector<Hypothesis>& hypotheses);
   // Those of a black region with as many white ones as the layout has squares; `members` are indices.
   void of_group(std::span<const size_t> members, std::vector<Hypothesis>& hypotheses);
 
@@ -46,13 +48,24 @@ class Hypotheses {
     Eigen::Vector2d centre;
     std::array<Eigen::Vector2d, 4> corners;
   };
+  // One that may belong to the same target as the seed.
+  struct Near {
+    double x, y;  // in the ideal image
+    double side_px;
+    size_t quad;
+  };
   struct Match {
     const LayoutSquare* square;
     size_t quad;
   };
   const Mark* mark(size_t quad);
+  struct SideBounds {
+    double low, high;  // px
+  };
+  std::optional<size_t> nearest_to(const Eigen::Vector2d& place, double reach, const SideBounds& side) const;
   void match(int scale, const Eigen::Matrix3d& H, double tolerance);
-  bool is_enough() const;
+  bool is_enough(std::span<const Match> matches) const;
+  size_t sort_cut();
   std::optional<Eigen::Matrix3d> fitted(const Eigen::Matrix3d& H);
   std::optional<Eigen::Matrix3d> by_centres();
   std::optional<Hypothesis> refined(int scale, const Eigen::Matrix3d& H);
@@ -64,7 +77,8 @@ class Hypotheses {
   std::optional<Labelling> labelling_;
   std::span<const WhiteQuad> quads_;
   std::vector<Mark> marks_;
-  std::vector<size_t> near_;
+  std::vector<size_t> by_x_;  // of a group
+  std::vector<Near> near_;    // of a seed, by x
   std::vector<Match> matches_;
   std::vector<SeenSquare> seen_, labelled_;
   std::vector<Eigen::Vector2d> plane_, image_;

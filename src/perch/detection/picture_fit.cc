@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <opencv2/core/hal/intrin.hpp>
 
@@ -12,7 +14,7 @@
 namespace perch {
 namespace {
 
-constexpr int kUnknowns = PictureRow::kUnknowns, kColumns = PictureRow::kColumns;
+constexpr int kUnknowns = PictureRows::kUnknowns;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
@@ -21,39 +23,35 @@ constexpr double kCauchy = 2.4;
 
 constexpr int kMostPasses = 8;
 
-// Sums of products of rows, the residual's column with them; four columns at a time, the upper blocks only.
+using Four = cv::v_float32x4;
+
+// Where a row of an upper triangle begins.
+constexpr int begin_of_row(int i) { return i * PictureRows::kColumns - i * (i - 1) / 2; }
+
+// Sums of products of rows, the residual's column with them, the upper triangle only.
 class Products {
  public:
-  Products() {
-    for (auto& of_row : sum_) {
-      for (auto& four : of_row) four = cv::v_setzero_f32();
-    }
-  }
-  void add(const PictureRow& row, float weight) {
-    cv::v_float32x4 block[kBlocks];
-    for (int k = 0; k < kBlocks; ++k) block[k] = cv::v_load(row.d.data() + 4 * k);
-    // A flat pixel has nothing to say of the step, blur and growth.
-    for (int i = row.flat ? 12 : 0; i < kUnknowns; ++i) {
-      const float own = row.d[static_cast<size_t>(i)];
-      if (own == 0) continue;
-      const cv::v_float32x4 w = cv::v_setall_f32(weight * own);
-      for (int k = i / 4; k < kBlocks; ++k) sum_[i][k] += w * block[k];
+  Products() { sums_.fill(cv::v_setzero_f32()); }
+  void add(const PictureRows& rows, const Four& weight) {
+    // Flat pixels have nothing to say of the step, blur and growth.
+    const int first = rows.flat ? PictureRows::kWhite : 0;
+    Four* sum = sums_.data() + begin_of_row(first);
+    for (int i = first; i < kUnknowns; ++i) {
+      const Four own = weight * rows.d[static_cast<size_t>(i)];
+      for (int k = i; k < PictureRows::kColumns; ++k) *sum++ += own * rows.d[static_cast<size_t>(k)];
     }
   }
   // Both are added to.
   void take(Normal& A, Unknowns& b) const {
+    const Four* sum = sums_.data();
     for (int i = 0; i < kUnknowns; ++i) {
-      std::array<float, kColumns> row{};
-      for (int k = i / 4; k < kBlocks; ++k) cv::v_store(row.data() + 4 * k, sum_[i][k]);
-      for (int j = i; j < kUnknowns; ++j)
-        A(i, j) = A(j, i) = static_cast<double>(row[static_cast<size_t>(j)]);
-      b(i) = static_cast<double>(row[PictureRow::kResidual]);
+      for (int k = i; k < kUnknowns; ++k) A(i, k) = A(k, i) = static_cast<double>(cv::v_reduce_sum(*sum++));
+      b(i) = static_cast<double>(cv::v_reduce_sum(*sum++));
     }
   }
 
  private:
-  static constexpr int kBlocks = kColumns / 4;
-  cv::v_float32x4 sum_[kUnknowns][kBlocks];
+  std::array<Four, begin_of_row(kUnknowns)> sums_;
 };
 
 }  // namespace
@@ -63,45 +61,69 @@ struct PictureFit::Pass {
   Normal A = Normal::Zero();
   Unknowns b = Unknowns::Zero();
   double squares = 0, weights = 0;                // of pixels without ground
+  double bends = 0;                               // of these, the loss's second derivatives
   double ground_squares = 0, ground_weights = 0;  // of pixels that are ground
   double neighbours = 0, pairs = 0;               // products of one pixel's with the next one's
   int crossed = 0;
 };
 
+namespace {
+
+// Four pixels of a line, of which some may lie beyond its end.
+Four grey_of(const uint8_t* line, int x, int width) {
+  std::array<float, PictureRows::kPixels> grey{};
+  for (int k = 0; k < PictureRows::kPixels && x + k < width; ++k) grey[static_cast<size_t>(k)] = line[x + k];
+  return cv::v_load(grey.data());
+}
+
+double sum_of(const Four& mask, const Four& values) {
+  return static_cast<double>(cv::v_reduce_sum(mask & values));
+}
+
+int count_of(const Four& mask) { return std::popcount(static_cast<unsigned>(cv::v_signmask(mask))); }
+
+}  // namespace
+
 PictureFit::Pass PictureFit::take(const cv::Mat& grey, const Noise& noise, bool levels_only) {
   Pass pass;
   Products products;
-  PictureRow row;
+  PictureRows rows;
+  const Four one = cv::v_setall_f32(1), pixel = cv::v_setall_f32(static_cast<float>(noise.pixel)),
+             ground = cv::v_setall_f32(static_cast<float>(noise.together * noise.ground)),
+             bound = cv::v_setall_f32(static_cast<float>(1 / (kCauchy * kCauchy)));
   // Every second row is enough for levels.
   for (int y = model_.first_row(); y <= model_.last_row(); y += levels_only ? 2 : 1) {
     const uint8_t* line = grey.ptr<uint8_t>(y);
-    double last = 0;
-    bool has_last = false;
-    for (int x = model_.first_column(); x <= model_.last_column(); ++x) {
-      if (!model_.row_of(x, y, line[x], row)) {
-        has_last = false;
+    // Of the pixel before; zero where it is not of the target.
+    std::array<float, PictureRows::kPixels + 1> errs{};
+    int on_target_bits = 0;
+    for (int x = model_.first_column(); x <= model_.last_column(); x += PictureRows::kPixels) {
+      if (!model_.rows_of(x, y, grey_of(line, x, grey.cols), rows)) {
+        errs.back() = 0;
+        on_target_bits = 0;
         continue;
       }
-      const double r = static_cast<double>(row.d[PictureRow::kResidual]),
-                   ground = static_cast<double>(row.ground);
-      const double variance = noise.pixel + noise.together * noise.ground * ground * ground;
-      const double loss = levels_only ? 1 : 1 / (1 + r * r / (kCauchy * kCauchy * variance));
-      products.add(row, static_cast<float>(loss / variance));
-      pass.crossed += !row.flat;
-      const bool on_target = ground < 0.02;
-      if (on_target && has_last) {
-        pass.neighbours += last * std::sqrt(loss) * r;
-        pass.pairs += 1;
-      }
-      last = std::sqrt(loss) * r;
-      has_last = on_target;
-      if (on_target) {
-        pass.squares += loss * r * r;
-        pass.weights += loss;
-      } else if (ground > 0.8) {
-        pass.ground_squares += loss * r * r;
-        pass.ground_weights += loss;
-      }
+      const Four& r = rows.d[PictureRows::kResidual];
+      const Four variance = pixel + ground * rows.ground * rows.ground;
+      const Four squares = r * r;
+      const Four loss = levels_only ? one : one / (one + squares * bound / variance);
+      products.add(rows, rows.asked & (loss / variance));
+      pass.crossed += count_of(rows.crossed);
+      const Four on_target = rows.asked & (rows.ground < cv::v_setall_f32(0.02F));
+      const Four on_ground = rows.asked & (rows.ground > cv::v_setall_f32(0.8F));
+      const Four weighted = loss * squares;
+      pass.squares += sum_of(on_target, weighted);
+      pass.weights += sum_of(on_target, loss);
+      pass.bends += sum_of(on_target, loss * (loss + loss - one));
+      pass.ground_squares += sum_of(on_ground, weighted);
+      pass.ground_weights += sum_of(on_ground, loss);
+      errs[0] = errs.back();
+      cv::v_store(errs.data() + 1, on_target & (cv::v_sqrt(loss) * r));
+      for (size_t k = 0; k < PictureRows::kPixels; ++k)
+        pass.neighbours += static_cast<double>(errs[k]) * static_cast<double>(errs[k + 1]);
+      // The lowest bit is the last pixel of those before.
+      on_target_bits = on_target_bits >> PictureRows::kPixels | cv::v_signmask(on_target) << 1;
+      pass.pairs += std::popcount(static_cast<unsigned>(on_target_bits & on_target_bits >> 1));
     }
   }
   products.take(pass.A, pass.b);
@@ -116,6 +138,13 @@ PictureFit::Noise PictureFit::noise_of(const Pass& pass) {
   noise.ground =
       std::max(0.0, kTaken * pass.ground_squares / std::max(pass.ground_weights, 1.0) - noise.pixel);
   return noise;
+}
+
+// Weights are those of the residuals before the step, which another residual has others of: least squares
+// with them go too short a way, by as much as the loss is less bent than its weights make it.
+double PictureFit::lengthening(const Pass& pass) {
+  constexpr double kMost = 1.5;
+  return pass.bends * kMost > pass.weights ? pass.weights / pass.bends : kMost;
 }
 
 // How many of a pixel's neighbours err as it does, of noise none: what the model does not know (a shadow's
@@ -152,14 +181,14 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
       known(i, i) += 1 / (sigma * sigma);
       towards(i) += (expected - value) / (sigma * sigma);
     };
-    hold(PictureRow::kBlur, 0.5 * p.blur.trace(), square, 0.6 * square);
-    hold(PictureRow::kBlur + 1, 0.5 * (p.blur(0, 0) - p.blur(1, 1)), 0, 0.4 * square);
-    hold(PictureRow::kBlur + 2, p.blur(0, 1), 0, 0.4 * square);
-    hold(PictureRow::kGrowth, p.growth, 0, 0.3);
-    hold(PictureRow::kGrowth + 1, p.outline_growth, 0, 0.0005 + 0.3 * std::abs(p.growth));
+    hold(PictureRows::kBlur, 0.5 * p.blur.trace(), square, 0.6 * square);
+    hold(PictureRows::kBlur + 1, 0.5 * (p.blur(0, 0) - p.blur(1, 1)), 0, 0.4 * square);
+    hold(PictureRows::kBlur + 2, p.blur(0, 1), 0, 0.4 * square);
+    hold(PictureRows::kGrowth, p.growth, 0, 0.3);
+    hold(PictureRows::kGrowth + 1, p.outline_growth, 0, 0.0005 + 0.3 * std::abs(p.growth));
     for (const int i : {1, 2}) {
-      hold(PictureRow::kWhite + i, p.white(i), 0, 25);
-      hold(PictureRow::kGround + i, p.ground(i), 0, 25);
+      hold(PictureRows::kWhite + i, p.white(i), 0, 25);
+      hold(PictureRows::kGround + i, p.ground(i), 0, 25);
     }
     information += known;
     Normal held = information;
@@ -167,14 +196,15 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
     held(6, 6) += std::pow(kSteepest * fitted.frame.radius, -2);
     held(7, 7) += std::pow(kSteepest * fitted.frame.radius, -2);
     held.diagonal().array() += 1e-9 * held.diagonal().tail<7>().maxCoeff();
-    const Unknowns x = held.ldlt().solve(pass.b + towards);
+    Unknowns x = held.ldlt().solve(pass.b + towards);
     if (!x.allFinite()) return std::nullopt;
-    p.white += x.segment<3>(PictureRow::kWhite);
-    p.black += x(PictureRow::kBlack);
-    p.ground += x.segment<3>(PictureRow::kGround);
+    p.white += x.segment<3>(PictureRows::kWhite);
+    p.black += x(PictureRows::kBlack);
+    p.ground += x.segment<3>(PictureRows::kGround);
     if (round == 0) continue;
     noise = noise_of(pass);
     noise.together = texture_together(0.5 * p.blur.trace());
+    x *= lengthening(pass);
     const PlaneStep step = x.head<8>();
     H = towards_camera(corrected(H, fitted.frame, step));
     const double mean = 0.5 * p.blur.trace() + x(8), most = 0.9 * std::max(mean, 0.1);
@@ -182,8 +212,8 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
     const double stretch = std::hypot(along, diagonal), part = stretch > most ? most / stretch : 1;
     p.blur << std::max(mean, 0.1) + part * along, part * diagonal, part * diagonal,
         std::max(mean, 0.1) - part * along;
-    p.growth = std::clamp(p.growth + x(PictureRow::kGrowth), -1.0, 1.0);
-    p.outline_growth = std::clamp(p.outline_growth + x(PictureRow::kGrowth + 1), -0.5, 0.5);
+    p.growth = std::clamp(p.growth + x(PictureRows::kGrowth), -1.0, 1.0);
+    p.outline_growth = std::clamp(p.outline_growth + x(PictureRows::kGrowth + 1), -0.5, 0.5);
     fitted.pixels = pass.crossed;
     fitted.together = together(pass);
     // Ends when the step is a tenth of its own deviation.
@@ -191,7 +221,7 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
   }
   const double step = p.white.x() - p.black;
   // More of it, and the picture is not what the model says it is.
-  constexpr double kMostTogether = 10;
+  constexpr double kMostTogether = 3;
   if (!done || !(step > contrast) || fitted.together > kMostTogether) return std::nullopt;
   constexpr int kRest = kUnknowns - 8;
   const Eigen::Matrix<double, 8, kRest> by_rest = information.topRightCorner<8, kRest>();

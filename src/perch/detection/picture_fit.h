@@ -40,6 +40,7 @@ class PictureFit {
   struct Pass;
   Pass take(const cv::Mat& grey, const Noise& noise, bool levels_only);
   static Noise noise_of(const Pass& pass);
+  static double lengthening(const Pass& pass);
   static double together(const Pass& pass);
 
   PictureModel model_;

@@ -9,9 +9,17 @@ namespace {
 // Beyond as many deviations of the blur an edge is not seen.
 constexpr float kFar = 4.2F;
 
-// The normal distribution and its density, of a table.
+// Edges near four pixels: of a nested target that is a few pixels wide all.
+constexpr size_t kMostNear = 72;
+
+using Four = cv::v_float32x4;
+
+Four all(float value) { return cv::v_setall_f32(value); }
+Four where(const Four& mask, const Four& value) { return mask & value; }
+
+// The normal distribution and its density.
 struct Gauss {
-  float below, density;
+  Four below, density;
 };
 
 class GaussTable {
@@ -19,22 +27,26 @@ class GaussTable {
   GaussTable() {
     for (int i = 0; i <= kSteps; ++i) {
       const double z = (i - kSteps / 2) / double{kPerUnit};
-      values_[static_cast<size_t>(i)] = {static_cast<float>(0.5 * std::erfc(-z / std::sqrt(2.0))),
-                                         static_cast<float>(std::exp(-0.5 * z * z) / std::sqrt(2 * M_PI))};
+      below_[static_cast<size_t>(i)] = static_cast<float>(0.5 * std::erfc(-z / std::sqrt(2.0)));
+      density_[static_cast<size_t>(i)] = static_cast<float>(std::exp(-0.5 * z * z) / std::sqrt(2 * M_PI));
     }
   }
-  // z within kFar. To second order from the nearest entry: 1e-6.
-  Gauss at(float z) const {
-    const float scaled = z * kPerUnit + kSteps / 2;
-    const int i = static_cast<int>(scaled + 0.5F);
-    const Gauss& near = values_[static_cast<size_t>(i)];
-    const float dz = (scaled - static_cast<float>(i)) / kPerUnit, z0 = z - dz;
-    return {near.below + near.density * dz * (1 - 0.5F * z0 * dz), near.density * (1 - z0 * dz)};
+  // To second order from the nearest entry: 1e-6. Beyond kFar it is all or nothing.
+  Gauss at(const Four& z) const {
+    const Four near = cv::v_min(cv::v_max(z, all(-kFar)), all(kFar));
+    const cv::v_int32x4 i = cv::v_round(near * all(kPerUnit));
+    const cv::v_int32x4 entry = i + cv::v_setall_s32(kSteps / 2);
+    const Four z0 = cv::v_cvt_f32(i) * all(1.0F / kPerUnit), dz = near - z0;
+    const Four below = cv::v_lut(below_.data(), entry), density = cv::v_lut(density_.data(), entry);
+    const Four within = cv::v_abs(z) <= all(kFar);
+    const Four far = where(z > all(kFar), all(1));
+    return {cv::v_select(within, below + density * dz * (all(1) - all(0.5F) * z0 * dz), far),
+            where(within, density * (all(1) - z0 * dz))};
   }
 
  private:
   static constexpr int kPerUnit = 32, kSteps = 2 * 5 * kPerUnit;
-  std::array<Gauss, kSteps + 1> values_;
+  std::array<float, kSteps + 1> below_, density_;
 };
 
 const GaussTable kGauss;
@@ -153,112 +165,128 @@ bool PictureModel::set(const Eigen::Matrix3d& H, const ImageFrame& frame,
          high_.y() <= camera_.height() - 1;
 }
 
-bool PictureModel::row_of(int column, int line, float grey, PictureRow& row) const {
-  const auto x = static_cast<float>(column), y = static_cast<float>(line);
-  row.d.fill(0);
-  row.flat = true;
+bool PictureModel::rows_of(int column, int line, const Four& grey, PictureRows& rows) const {
+  const Four lanes(0, 1, 2, 3);
+  const Four x = all(static_cast<float>(column)) + lanes;
+  const auto first = static_cast<float>(column), last = first + PictureRows::kPixels - 1,
+             y = static_cast<float>(line);
+  rows.flat = true;
+  rows.crossed = cv::v_setzero_f32();
+  rows.asked = x <= all(static_cast<float>(last_column()));
   // The levels' parts, from what each shape covers.
-  float of_white = has_ground_ ? 0 : 1, of_black = 0, of_ground = 1 - of_white;
+  Four of_white = all(has_ground_ ? 0 : 1), of_black = cv::v_setzero_f32(), of_ground = all(1) - of_white;
   struct Near {
     const Edge* edge;
-    float by_distance, z;
-    bool black_side_ground;
-    float grows, outline;
+    Four by_distance, z;
+    float grows;
+    bool on_ground;
   };
-  std::array<Near, 16> near;
+  std::array<Near, kMostNear> near;
   size_t count = 0;
   struct NearCorner {
     const std::array<float, 3>* by_blur;
-    float by_correlation;
-    bool black_side_ground;
+    Four by_correlation;
+    bool on_ground;
   };
-  std::array<NearCorner, 8> corners;
+  std::array<NearCorner, kMostNear> corners;
   size_t corner_count = 0;
   for (const Shape& shape : shapes_) {
     // Of the largest shape the distance itself is asked.
-    if (x < shape.low_x || x > shape.high_x || y < shape.low_y || y > shape.high_y) continue;
-    std::array<Gauss, 4> g;
-    std::array<float, 4> z;
-    bool outside = false, all = true;
+    if (last < shape.low_x || first > shape.high_x || y < shape.low_y || y > shape.high_y) continue;
+    std::array<Four, 4> z;
+    Four within = rows.asked, is_near = cv::v_setzero_f32();
     for (size_t k = 0; k < 4; ++k) {
       const Edge& e = shape.edges[k];
-      const float t = std::clamp(e.tx * x + e.ty * y + e.start, 0.0F, 1.0F);
-      const float d = e.nx * x + e.ny * y + e.offset - e.bend * t * (1 - t);
-      if (d < -shape.room) return false;
-      z[k] = d * e.per_sigma;
-      if (z[k] < -kFar) outside = true;
-      all = all && z[k] > kFar;
+      const Four t = cv::v_min(cv::v_max(all(e.tx) * x + all(e.ty * y + e.start), all(0)), all(1));
+      const Four d = all(e.nx) * x + all(e.ny * y + e.offset) - all(e.bend) * t * (all(1) - t);
+      rows.asked &= d >= all(-shape.room);
+      z[k] = d * all(e.per_sigma);
+      within &= z[k] >= all(-kFar);
+      is_near |= z[k] <= all(kFar);
     }
-    if (outside) continue;
-    float inside = 1;
-    if (!all) {
-      for (size_t k = 0; k < 4; ++k) g[k] = z[k] > kFar ? Gauss{1, 0} : kGauss.at(z[k]);
-      const float across = g[0].below + g[2].below - 1, up = g[1].below + g[3].below - 1;
+    within &= rows.asked;
+    if (!cv::v_check_any(within)) continue;
+    Four inside = where(within, all(1));
+    if (cv::v_check_any(is_near & within)) {
+      std::array<Gauss, 4> g;
+      for (size_t k = 0; k < 4; ++k) g[k] = kGauss.at(z[k]);
+      const Four across = g[0].below + g[2].below - all(1), up = g[1].below + g[3].below - all(1);
       inside = across * up;
-      std::array<float, 4> by_z = {g[0].density * up, g[1].density * across, g[2].density * up,
-                                   g[3].density * across};
+      std::array<Four, 4> by_z = {g[0].density * up, g[1].density * across, g[2].density * up,
+                                  g[3].density * across};
       for (size_t k = 0; k < 4; ++k) {
         const size_t m = (k + 1) % 4;
-        const float densities = g[k].density * g[m].density;
-        if (densities < 1e-4F) continue;
-        const float r = shape.corner[k], a = z[k], b = z[m], both = r * densities;
+        const Four both_near = g[k].density * g[m].density;
+        const Four densities = where(within & (both_near >= all(1e-4F)), both_near);
+        if (!cv::v_check_any(densities > all(0))) continue;
+        const float r = shape.corner[k];
+        const Four &u = z[k], &v = z[m], both = all(r) * densities;
         if (corner_count < corners.size()) {
-          corners[corner_count++] = {&shape.corner_by_blur[k], shape.white * densities * (1 + r * a * b),
-                                     shape.ground};
+          corners[corner_count++] = {&shape.corner_by_blur[k],
+                                     all(shape.white) * densities * (all(1) + all(r) * u * v), shape.ground};
         }
-        inside += both * (1 + r / 2 * a * b + r * r / 6 * (a * a - 1) * (b * b - 1));
-        by_z[k] += both * (-a + r / 2 * b * (1 - a * a));
-        by_z[m] += both * (-b + r / 2 * a * (1 - b * b));
+        inside += both * (all(1) + all(r / 2) * u * v + all(r * r / 6) * (u * u - all(1)) * (v * v - all(1)));
+        by_z[k] += both * (all(r / 2) * v * (all(1) - u * u) - u);
+        by_z[m] += both * (all(r / 2) * u * (all(1) - v * v) - v);
       }
+      inside = where(within, inside);
       for (size_t k = 0; k < 4 && count < near.size(); ++k) {
-        if (!(std::abs(by_z[k]) > 1e-4F)) continue;
-        near[count++] = {&shape.edges[k], shape.white * by_z[k], z[k],
-                         shape.ground,    shape.white,           shape.ground ? 1.0F : 0.0F};
+        if (!cv::v_check_any(within & (cv::v_abs(by_z[k]) > all(1e-4F)))) continue;
+        near[count++] = {&shape.edges[k], where(within, all(shape.white) * by_z[k]), z[k], shape.white,
+                         shape.ground};
       }
     }
     if (shape.ground) {
       of_ground -= inside;
       of_white += inside;
     } else {
-      of_white += shape.white * inside;
-      of_black -= shape.white * inside;
+      of_white += all(shape.white) * inside;
+      of_black -= all(shape.white) * inside;
     }
   }
-  const auto u = static_cast<float>((x - middle_.x()) * per_px_),
-             v = static_cast<float>((y - middle_.y()) * per_px_);
+  if (!cv::v_check_any(rows.asked)) return false;
+  const Four per_px = all(static_cast<float>(per_px_));
+  const Four u = (x - all(static_cast<float>(middle_.x()))) * per_px,
+             v = (all(y) - all(static_cast<float>(middle_.y()))) * per_px;
   const auto level = [&](const Eigen::Vector3d& l) {
-    return static_cast<float>(l.x()) + u * static_cast<float>(l.y()) + v * static_cast<float>(l.z());
+    return all(static_cast<float>(l.x())) + u * all(static_cast<float>(l.y())) +
+           v * all(static_cast<float>(l.z()));
   };
-  const float white = level(parameters_.white), ground = level(parameters_.ground);
-  const auto black = static_cast<float>(parameters_.black);
-  float* d = row.d.data();
-  d[PictureRow::kWhite] = of_white, d[PictureRow::kWhite + 1] = of_white * u,
-  d[PictureRow::kWhite + 2] = of_white * v;
-  d[PictureRow::kBlack] = of_black;
-  d[PictureRow::kGround] = of_ground, d[PictureRow::kGround + 1] = of_ground * u,
-  d[PictureRow::kGround + 2] = of_ground * v;
-  row.ground = of_ground;
-  d[PictureRow::kResidual] = grey - of_white * white - of_black * black - of_ground * ground;
+  const Four white = level(parameters_.white), ground = level(parameters_.ground),
+             black = all(static_cast<float>(parameters_.black));
+  auto& d = rows.d;
+  d[PictureRows::kWhite] = of_white, d[PictureRows::kWhite + 1] = of_white * u,
+  d[PictureRows::kWhite + 2] = of_white * v;
+  d[PictureRows::kBlack] = of_black;
+  d[PictureRows::kGround] = of_ground, d[PictureRows::kGround + 1] = of_ground * u,
+  d[PictureRows::kGround + 2] = of_ground * v;
+  rows.ground = of_ground;
+  d[PictureRows::kResidual] = grey - of_white * white - of_black * black - of_ground * ground;
   for (size_t i = 0; i < count; ++i) {
     const Near& n = near[i];
     const Edge& e = *n.edge;
-    const float step = white - (n.black_side_ground ? ground : black);
-    const float by_distance = step * n.by_distance * e.per_sigma;
-    if (std::abs(by_distance) < 0.02F) continue;
-    row.flat = false;
-    const float t = e.tx * x + e.ty * y + e.start;
-    const float to = by_distance * t, from = by_distance - to;
-    for (size_t j = 0; j < 8; ++j) d[j] += from * e.from[j] + to * e.to[j];
-    const float by_sigma = -by_distance * n.z;
-    for (size_t j = 0; j < 3; ++j) d[PictureRow::kBlur + j] += by_sigma * e.by_blur[j];
-    d[PictureRow::kGrowth] += by_distance * n.grows;
-    d[PictureRow::kGrowth + 1] += by_distance * n.outline;
+    const Four step = white - (n.on_ground ? ground : black);
+    const Four by_any = step * n.by_distance * all(e.per_sigma);
+    const Four is_crossed = rows.asked & (cv::v_abs(by_any) >= all(0.02F));
+    if (!cv::v_check_any(is_crossed)) continue;
+    if (rows.flat) std::fill_n(d.begin(), PictureRows::kWhite, cv::v_setzero_f32());
+    rows.flat = false;
+    rows.crossed |= is_crossed;
+    const Four by_distance = where(is_crossed, by_any);
+    const Four t = all(e.tx) * x + all(e.ty * y + e.start);
+    const Four to = by_distance * t, from = by_distance - to;
+    for (size_t j = 0; j < 8; ++j) d[j] += from * all(e.from[j]) + to * all(e.to[j]);
+    const Four by_sigma = all(0) - by_distance * n.z;
+    for (size_t j = 0; j < 3; ++j) d[PictureRows::kBlur + j] += by_sigma * all(e.by_blur[j]);
+    d[PictureRows::kGrowth] += by_distance * all(n.grows);
+    if (n.on_ground) d[PictureRows::kGrowth + 1] += by_distance;
   }
-  if (row.flat) return true;
+  if (rows.flat) return true;
   for (size_t i = 0; i < corner_count; ++i) {
     const NearCorner& n = corners[i];
-    const float by_correlation = (white - (n.black_side_ground ? ground : black)) * n.by_correlation;
-    for (size_t j = 0; j < 3; ++j) d[PictureRow::kBlur + j] += by_correlation * (*n.by_blur)[j];
+    const Four by_correlation =
+        where(rows.crossed, (white - (n.on_ground ? ground : black)) * n.by_correlation);
+    for (size_t j = 0; j < 3; ++j) d[PictureRows::kBlur + j] += by_correlation * all((*n.by_blur)[j]);
   }
   return true;
 }

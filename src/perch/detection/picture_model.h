@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <opencv2/core/hal/intrin.hpp>
 #include <span>
 #include <vector>
 
@@ -20,13 +21,18 @@ struct PictureParameters {
   double black = 0;
 };
 
-// A row of the picture's least squares: a pixel's derivatives by all of them, and what is left of its level.
-struct PictureRow {
+// Four pixels beside each other, a lane each, as rows of the picture's least squares: a pixel's derivatives
+// by all of them, and what is left of its level.
+struct PictureRows {
+  using Four = cv::v_float32x4;
+  static constexpr int kPixels = 4;
   static constexpr int kStep = 0, kBlur = 8, kGrowth = 11, kWhite = 13, kBlack = 16, kGround = 17;
-  static constexpr int kUnknowns = 20, kResidual = 20, kColumns = 24;
-  alignas(16) std::array<float, kColumns> d;
-  float ground = 0;  // how much of the pixel is ground
-  bool flat = true;  // no edge is near
+  static constexpr int kUnknowns = 20, kResidual = 20, kColumns = 21;
+  std::array<Four, kColumns> d;  // where all are flat, those of step, blur and growth are not set
+  Four ground;                   // how much of a pixel is ground
+  Four asked;                    // all bits set, or none: farther off the target than its levels are worth
+  Four crossed;                  // the same: an edge is near
+  bool flat = true;              // no edge is near any of them
 };
 
 // The picture of a target of squares as its grey levels, from a homography, blur and three levels: each shape
@@ -49,8 +55,8 @@ class PictureModel {
   int first_column() const { return static_cast<int>(low_.x()); }
   int last_column() const { return static_cast<int>(high_.x()); }
 
-  // False when the pixel is farther off the target than its levels are worth.
-  bool row_of(int x, int y, float grey, PictureRow& row) const;
+  // Of the pixels from (x, y) on. False when none of them is asked for.
+  bool rows_of(int x, int y, const cv::v_float32x4& grey, PictureRows& rows) const;
 
  private:
   struct Edge {

@@ -66,6 +66,7 @@ void QuadTracer::trace(const RunImage& image, const Component& component, int la
 void list_quads(const Segmentation& s, int row_step, int siblings, std::vector<WhiteQuad>& quads) {
   quads.clear();
   const auto count = static_cast<int>(s.components.list.size());
+  const auto last_row = static_cast<int>(s.image.rows.size()) - 1;
   for (int label = 1; label < count; ++label) {
     const Component& c = s.at(label);
     if (!c.white || s.is_noise(label)) continue;
@@ -79,6 +80,7 @@ void list_quads(const Segmentation& s, int row_step, int siblings, std::vector<W
     quad.seen.corners = box_corners(c, row_step);
     quad.seen.centre = 0.5 * (quad.seen.corners[0] + quad.seen.corners[2]);
     quad.seen.component = label;
+    quad.cut = c.left == 0 || c.top == 0 || c.right == s.image.width - 1 || c.bottom == last_row;
     quad.side_px = std::sqrt(static_cast<double>(c.area * row_step));
     quads.push_back(quad);
   }

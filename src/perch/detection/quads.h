@@ -13,6 +13,7 @@ struct WhiteQuad {
   double side_px = 0;       // root of its area
   bool measured = false;    // what is above is more than a guess from its box
   bool four_sided = false;  // the corners are measured, and explain the area
+  bool cut = false;         // by the picture's edge
   int around = 0;           // label of the black region around it
 };
 

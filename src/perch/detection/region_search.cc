@@ -22,6 +22,9 @@ constexpr double kLeastInOrder = 0.55;
 // Found edges of those asked for: what explains as many needs no rival.
 constexpr double kExplained = 0.85;
 
+// Of the edges asked for: one that has so many of them there outdoes one that has no more than so many.
+constexpr double kWholly = 0.97, kClearlyLess = 0.94;
+
 // The sum of the part of edges found and the part of the pairs in order. In 2118 random scenes none of the
 // wrong ones that four squares of another place suggested had more than 1.28, none of the right ones less
 // than 1.41. Where three squares are all, wrong ones had up to 1.66 but no more than 0.93 in order, right
@@ -90,10 +93,23 @@ bool RegionSearch::is_quad(const Picture& picture, WhiteQuad& quad) {
   return tracer_.measure(picture.segmentation, picture.row_step, quad);
 }
 
-bool RegionSearch::is_sure_enough(const Confirmed& found, double in_order) const {
+int RegionSearch::squares_of(const Confirmed& found) const {
   int squares = 0;
   for (size_t i = 0; i < edges_.shapes.size(); ++i)
     squares += edges_.shapes[i].kind == ShapeKind::kSquare && found.seen[i];
+  return squares;
+}
+
+// Whether one that has as much grey in its order, turned by quarters, is not what is there: of four squares
+// and more every edge is where it should be, and many of the rival's are not.
+bool RegionSearch::outdoes(const Confirmed& best, const std::optional<Confirmed>& rival) const {
+  if (squares_of(best) <= kLeastSquares || confirmation_.has_small_squares(best.frame)) return false;
+  if (best.found < kWholly * best.asked) return false;
+  return !rival || rival->found < kClearlyLess * rival->asked;
+}
+
+bool RegionSearch::is_sure_enough(const Confirmed& found, double in_order) const {
+  const int squares = squares_of(found);
   const double sum = in_order + static_cast<double>(found.found) / found.asked;
   if (squares > kLeastSquares) return sum >= kLeastSure;
   return sum >= kLeastSureOfThree && in_order >= kLeastInOrderOfThree;
@@ -103,7 +119,7 @@ bool RegionSearch::is_sure_enough(const Confirmed& found, double in_order) const
 //
 // The border looks the same after a quarter turn, and so do some of the squares where others are hidden or
 // too small for a search of their edges. All four turns are tried, and the one that stands must have more
-// grey in its order than each of the others.
+// grey in its order than each of the others, or outdo it.
 bool RegionSearch::try_hypotheses(const Picture& picture, std::vector<Confirmed>& found) {
   const cv::Mat& grey = picture.grey;
   std::optional<Confirmed> best;
@@ -143,11 +159,16 @@ bool RegionSearch::try_hypotheses(const Picture& picture, std::vector<Confirmed>
     order = order_of(best->image_from_plane, 0);
     as_good = rivals(best->image_from_plane, order);
   }
-  if (std::ranges::find(as_good, true) != as_good.end()) return false;
+  for (int k = 1; k < 4; ++k) {
+    if (!as_good[static_cast<size_t>(k)]) continue;
+    const auto rival =
+        confirmation_.confirm(grey, turned(best->image_from_plane, k), kRegionRadius, requirement_);
+    if (!outdoes(*best, rival)) return false;
+  }
   if (!is_sure_enough(*best, order)) return false;
   const TargetArea area(target_, edges_, camera_, *best);
   for (WhiteQuad& quad : quads_) {
-    if (!area.may_hold(quad.seen.centre) || !is_quad(picture, quad)) continue;
+    if (quad.cut || !area.may_hold(quad.seen.centre) || !is_quad(picture, quad)) continue;
     // A whole piece of a square whose outline is not there: a window's pane.
     if (area.is_stranger(quad) || area.piece_of(quad)) return false;
   }
@@ -175,9 +196,10 @@ void RegionSearch::search_group(const Picture& picture, const Group& group, Stop
   int seeds = 0;
   for (const size_t seed : members_) {
     if (tries_ == 0 || seeds == kMostSeeds) break;
-    if (!quads_[seed].four_sided || known(seed)) continue;
+    if (!quads_[seed].four_sided || quads_[seed].cut || known(seed)) continue;
+    if (seeds == 0) hypotheses_.begin_group(members_);
     ++seeds;
-    hypotheses_.of_seed(seed, members_, proposed_);
+    hypotheses_.of_seed(seed, proposed_);
     if (proposed_.empty()) continue;
     stopwatch.lap("hypotheses");
     try_hypotheses(picture, found);
@@ -189,6 +211,7 @@ void RegionSearch::search_group(const Picture& picture, const Group& group, Stop
 void RegionSearch::search(const cv::Mat& grey, const Segmentation& segmentation, const Regions& regions,
                           Stopwatch& stopwatch, std::vector<Confirmed>& found) {
   const Picture picture{grey, segmentation, regions.row_step};
+  requirement_.is_measured_after = regions.is_measured_after;
   list_quads(segmentation, regions.row_step, regions.pooled ? 1 : static_cast<int>(kLeastRegions), quads_);
   make_groups(regions.pooled);
   areas_.clear();

@@ -21,7 +21,8 @@ class RegionSearch {
 
   // How a segmentation came to be.
   struct Regions {
-    int row_step = 1;     // of its rows
+    int row_step = 1;                // of its rows
+    bool is_measured_after = false;  // see Requirement
     bool pooled = false;  // squares count together whatever black they lie in: a shadow's edge may part it
   };
   // Adds every target that is confirmed and not among those `found` before.
@@ -44,6 +45,8 @@ class RegionSearch {
   bool is_known(const Eigen::Vector2d& pixel) const;
   void search_group(const Picture& picture, const Group& group, Stopwatch& stopwatch,
                     std::vector<Confirmed>& found);
+  int squares_of(const Confirmed& found) const;
+  bool outdoes(const Confirmed& best, const std::optional<Confirmed>& rival) const;
   bool is_sure_enough(const Confirmed& found, double in_order) const;
   bool try_hypotheses(const Picture& picture, std::vector<Confirmed>& found);
 
