@@ -78,6 +78,22 @@ LandingTarget two_moved(TestRng& rng) {
   return panel_of(squares);
 }
 
+// Two lie half beside their places.
+LandingTarget two_beside(TestRng& rng) {
+  std::vector<Box> squares = kSharp;
+  for (int moved = 0; moved < 2;) {
+    const auto i = static_cast<size_t>(rng.index(6));
+    const double by = (rng.index(2) == 0 ? 0.5 : -0.5) * kSharp[i].side;
+    Box to = kSharp[i];
+    (rng.index(2) == 0 ? to.column : to.row) += by;
+    if (!is_free(squares, to, i) || squares[i].column != kSharp[i].column || squares[i].row != kSharp[i].row)
+      continue;
+    squares[i] = to;
+    ++moved;
+  }
+  return panel_of(squares);
+}
+
 // Two were never there. One is forgiven: it may be covered by something black.
 LandingTarget two_missing(TestRng& rng) {
   std::vector<Box> squares = kSharp;
@@ -147,6 +163,7 @@ struct Kind {
   std::function<LandingTarget(TestRng&)> make;
 };
 const Kind kKinds[] = {{"TwoSquaresMoved", two_moved},
+                       {"TwoSquaresBeside", two_beside},
                        {"TwoSquaresMissing", two_missing},
                        {"RandomSquares", random_squares},
                        {"Window", window},

@@ -18,8 +18,9 @@ constexpr int kLastLines = 6;
 // Nor does a target of which so little can be seen say what it is.
 constexpr int kLeastLines = 12;
 
-// Of the lines across a square: fewer, and it is hidden; more, and it is there.
-constexpr double kHidden = 0.2, kThere = 0.8;
+// Of the lines across a square or an edge: fewer, and it is hidden; more, and it is there.
+constexpr double kHidden = 0.25, kThere = 0.8;
+constexpr int kLeastOfEdge = 3;
 
 // Of the lines of a first look that makes a second one needless.
 constexpr double kPlain = 0.95;
@@ -102,11 +103,12 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
   // Of all edges that can be told: whether any is missing; whether two of each square's are there.
   bool is_faultless = true;
   partly_ = 0;
-  int squares = 0, all_squares = 0, complete = 0, border_edges = 0;
+  int squares = 0, all_squares = 0, complete = 0, broken = 0, border_edges = 0;
   int holes = 0, holes_asked = 0, asked = 0, found = 0;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
     const ShapeKind kind = target_.shapes[i].kind;
     int known = 0, seen = 0, lines = 0, lines_found = 0;
+    bool is_broken = false;
     for (size_t k = 4 * i; k < 4 * i + 4; ++k) {
       const EdgeTally& tally = tallies_[k];
       // The ground beside the outline may be as pale: nobody can ask for that.
@@ -114,6 +116,7 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
         found += tally.found;
         asked += tally.asked;
       }
+      is_broken = is_broken || (tally.asked >= kLeastOfEdge && tally.found <= kHidden * tally.asked);
       lines += tally.asked;
       lines_found += tally.found;
       const EdgeTally& judged = is_unsure(tally) ? in_order_[k] : tally;
@@ -125,6 +128,7 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
     if (kind == ShapeKind::kSquare) {
       squares += seen_[i];
       complete += seen >= 2;
+      broken += is_broken;
       partly_ += lines_found > kHidden * lines && lines_found < kThere * lines;
       ++all_squares;
     } else {
@@ -136,6 +140,9 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
       holes_asked += known;
     }
   }
+  // Half of them may be covered. A homography that makes squares elsewhere nearly ours has edges missing of
+  // more.
+  if (2 * broken > all_squares) return false;
   // Without the hole it is the other one of the two targets.
   if (holes_asked >= 3 && 2 * holes < holes_asked) return false;
   // So near that less of the border is in the picture, all squares are, or all but one and a side of it.

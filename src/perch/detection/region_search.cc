@@ -170,7 +170,7 @@ bool RegionSearch::try_hypotheses(const Picture& picture, std::vector<Confirmed>
   for (WhiteQuad& quad : quads_) {
     if (quad.cut || !area.may_hold(quad.seen.centre) || !is_quad(picture, quad)) continue;
     // A whole piece of a square whose outline is not there: a window's pane.
-    if (area.is_stranger(quad) || area.piece_of(quad)) return false;
+    if (area.is_stranger(quad) || area.piece_of(quad) || area.is_beside(quad)) return false;
   }
   found.push_back(*best);
   areas_.push_back(area);

@@ -41,6 +41,7 @@ TargetArea::TargetArea(const LandingTarget& target, const TargetEdges& edges, co
   box_ = Eigen::AlignedBox2d(box_.min() - bulge, box_.max() + bulge);
   const Eigen::Vector2d centre = H.col(2).hnormalized();
   const Eigen::Matrix2d by_q = (H.topLeftCorner<2, 2>() - centre * H.row(2).head<2>()) / H(2, 2);
+  px2_per_m2_ = std::pow(camera.intrinsics()[0], 2) * std::abs(by_q.determinant());
   px_ = 1 / (camera.intrinsics()[0] * Eigen::JacobiSVD<Eigen::Matrix2d>(by_q).singularValues()(1));
 }
 
@@ -96,6 +97,20 @@ bool TargetArea::is_stranger(const WhiteQuad& quad) const {
   };
   const auto hidden = std::ranges::count_if(shapes, [&](size_t i) { return is_hidden(i); });
   return !(hidden == 1 ? std::ranges::any_of(shapes, touches) : std::ranges::count_if(shapes, hides) >= 2);
+}
+
+bool TargetArea::is_beside(const WhiteQuad& quad) const {
+  if (!box_.contains(quad.seen.centre)) return false;
+  const auto centre = on_plane(quad.seen.centre);
+  if (!centre) return false;
+  for (const TargetShape& shape : edges_.shapes) {
+    if (shape.kind != ShapeKind::kSquare || shape.inner) continue;
+    const double off = (*centre - shape.centre).norm();
+    if (off > 0.75 * shape.side) continue;
+    const double part = quad.side_px * quad.side_px / (shape.side * shape.side * px2_per_m2_);
+    return part > 0.6 && part < 1.7 && off > 0.2 * shape.side + 0.3 * px_;
+  }
+  return false;
 }
 
 std::optional<size_t> TargetArea::piece_of(const WhiteQuad& quad) const {

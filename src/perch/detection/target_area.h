@@ -26,6 +26,8 @@ class TargetArea {
   bool is_stranger(const WhiteQuad& quad) const;
 
   // The square that was not seen and in which a four-sided region lies, much smaller than it.
+  // Whether the region is of about a square's size, and too far off the middle of its place to be it.
+  bool is_beside(const WhiteQuad& quad) const;
   std::optional<size_t> piece_of(const WhiteQuad& quad) const;
 
  private:
@@ -36,6 +38,7 @@ class TargetArea {
   const CameraModel& camera_;
   const Confirmed& found_;
   double size_, interior_ = 0, smallest_;  // m
+  double px2_per_m2_ = 0;                  // at the target's middle
   double px_;                              // one pixel on the plane where it is seen shortest, m
   Eigen::Matrix3d plane_from_image_;
   Eigen::AlignedBox2d box_;  // px, around all of it
