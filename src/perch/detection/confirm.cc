@@ -104,7 +104,8 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
   bool is_faultless = true;
   partly_ = 0;
   int squares = 0, all_squares = 0, complete = 0, broken = 0, border_edges = 0;
-  int holes = 0, holes_asked = 0, asked = 0, found = 0;
+  int holes = 0, holes_asked = 0, inner_squares = 0, asked = 0, found = 0;
+  bool is_nested = false;
   for (size_t i = 0; i < target_.shapes.size(); ++i) {
     const ShapeKind kind = target_.shapes[i].kind;
     int known = 0, seen = 0, lines = 0, lines_found = 0;
@@ -129,6 +130,7 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
       squares += seen_[i];
       complete += seen >= 2;
       broken += is_broken;
+      inner_squares += target_.shapes[i].inner && seen_[i];
       partly_ += lines_found > kHidden * lines && lines_found < kThere * lines;
       ++all_squares;
     } else {
@@ -136,6 +138,7 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
     }
     if (kind != ShapeKind::kOutline) is_faultless = is_faultless && seen == known;
     if (kind == ShapeKind::kHole) {
+      is_nested = true;
       holes += seen;
       holes_asked += known;
     }
@@ -145,6 +148,10 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
   if (2 * broken > all_squares) return false;
   // Without the hole it is the other one of the two targets.
   if (holes_asked >= 3 && 2 * holes < holes_asked) return false;
+  // Nor is there anything to tell which it is where neither the hole nor what lies in it is seen, but the
+  // frames before.
+  const bool is_cold = requirement.squares > 1;
+  if (is_nested && is_cold && holes == 0 && inner_squares < 2) return false;
   // So near that less of the border is in the picture, all squares are, or all but one and a side of it.
   const bool is_within =
       is_faultless && complete + std::min(border_edges, 1) >= all_squares && found >= kPlain * asked;
@@ -344,8 +351,11 @@ std::optional<Confirmed> Confirmation::confirm(const cv::Mat& grey, const Eigen:
     contradicted_ = target_.shapes[i].kind == ShapeKind::kSquare && !is_whole(i, search.lines) &&
                     is_beside(grey, H, target_.shapes[i], result.contrast);
   }
-  contradicted_ = contradicted_ || !is_layout(grey, H);
   if (contradicted_) return std::nullopt;
+  if (!is_layout(grey, H)) {
+    contradicted_ = is_clear();
+    return std::nullopt;
+  }
   if (result.by_one_look) {  // as many as a second look has
     result.found *= kLastLines / search.lines;
     result.asked *= kLastLines / search.lines;

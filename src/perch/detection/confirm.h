@@ -59,11 +59,12 @@ class Confirmation {
   std::optional<Confirmed> confirm(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                    double radius, const Requirement& requirement);
 
-  // Whether the last picture was clearly that of another panel: squares lie beside the places of ours or are
-  // missing, or there are edges enough that are not ours.
+  // Whether the last picture was clearly that of another panel: squares lie beside the places of ours, or
+  // edges that are wholly there or not at all are too few or show another layout.
   bool is_contradicted() const { return contradicted_; }
 
-  // Whether the target's smallest squares are too small for their edges to be told apart.
+  // Whether the target's smallest squares, not counting a nested one's, are too small for their edges to be
+  // told apart.
   bool has_small_squares(const ImageFrame& frame) const;
 
  private:

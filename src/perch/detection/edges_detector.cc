@@ -37,7 +37,10 @@ constexpr double kPredictionRadius = 10;  // px, beyond which the whole picture 
 // Found edges of those asked for: what explains as many where it was expected needs no rival.
 constexpr double kExplained = 0.85;
 
-// Found edges of the target's own of a small one whose picture is not what it should be.
+// A small target's picture is what it should be where no more pixels than this err as one.
+constexpr double kAlike = 3;
+
+// Found edges of the target's own of one whose picture is not.
 constexpr double kMostlyThere = 0.78;
 
 // The picture at half the size of the one before, where noise and blur are half as large.
@@ -60,6 +63,17 @@ bool is_sure(const Confirmed& found) {
 }
 
 bool is_explained(const Confirmed& found) { return found.found >= kExplained * found.asked; }
+
+PlaneMeasurement measurement_of(const PictureFitted& fitted) {
+  PlaneMeasurement plane;
+  plane.image_from_plane = fitted.image_from_plane;
+  plane.frame = fitted.frame;
+  plane.information = fitted.information;
+  plane.rms_px = plane.sigma_px = fitted.rms_px;
+  plane.growth_px = fitted.growth;
+  plane.edges = fitted.pixels;
+  return plane;
+}
 
 // The camera that takes the picture at half the size: pixel x covers 2 x and 2 x + 1.
 CameraModel halved(const CameraModel& camera) {
@@ -111,7 +125,6 @@ struct EdgesDetector::Work {
   std::optional<Predicted> predicted(const Prediction& prediction) const;
   bool measure_predicted(const cv::Mat& grey, const Predicted& expected, double blur_px);
   std::optional<Confirmed> follow(const cv::Mat& grey, const Predicted& expected);
-  std::optional<PlaneMeasurement> measure_picture(const cv::Mat& grey, const Confirmed& found);
   void measure(const cv::Mat& grey, const Confirmed& found);
   void take(const PlaneMeasurement& plane);
   void add_corners(const PlaneMeasurement& plane);
@@ -154,8 +167,10 @@ bool EdgesDetector::Work::measure_predicted(const cv::Mat& grey, const Predicted
   if (!(blur_px > 0) || confirmation.has_small_squares(frame)) return false;
   const auto plane =
       edges_measurement.measure(grey, expected.image_from_plane, blur_px, true, detection.residuals);
-  if (plane) take(*plane);
-  return plane.has_value();
+  const bool is_there = plane && std::abs(plane->blur_px - blur_px) < kSameBlur * plane->blur_px;
+  if (!is_there) detection.residuals.clear();
+  if (is_there) take(*plane);
+  return is_there;
 }
 
 std::optional<Confirmed> EdgesDetector::Work::follow(const cv::Mat& grey, const Predicted& expected) {
@@ -245,29 +260,19 @@ void EdgesDetector::Work::add_corners(const PlaneMeasurement& plane) {
   }
 }
 
-// By the grey levels of its picture, where its edges cannot be told apart.
-std::optional<PlaneMeasurement> EdgesDetector::Work::measure_picture(const cv::Mat& grey,
-                                                                     const Confirmed& found) {
-  const auto fitted =
-      picture_fit.fit(grey, found.image_from_plane, target.size, found.blur, options.min_contrast);
-  if (!fitted) return std::nullopt;
-  PlaneMeasurement plane;
-  plane.image_from_plane = fitted->image_from_plane;
-  plane.frame = fitted->frame;
-  plane.information = fitted->information;
-  plane.rms_px = plane.sigma_px = fitted->rms_px;
-  plane.growth_px = fitted->growth;
-  plane.edges = fitted->pixels;
-  return plane;
-}
-
+// By the places of its edges, or the grey levels of its picture where those cannot be told apart.
 void EdgesDetector::Work::measure(const cv::Mat& grey, const Confirmed& found) {
   std::optional<PlaneMeasurement> plane;
-  const bool is_small = confirmation.has_small_squares(found.frame);
-  if (is_small) plane = measure_picture(grey, found);
-  if (is_small && !plane && !is_sure(found) && edges_measurement.is_in_view(found.image_from_plane)) return;
-  if (!plane)
+  if (confirmation.has_small_squares(found.frame)) {
+    const auto fitted =
+        picture_fit.fit(grey, found.image_from_plane, target.size, found.blur, options.min_contrast);
+    const bool is_alike = picture_fit.is_outside() || (fitted && fitted->together < kAlike);
+    if (!is_alike && !is_sure(found)) return;
+    if (fitted) plane = measurement_of(*fitted);
+  }
+  if (!plane) {
     plane = edges_measurement.measure(grey, found.image_from_plane, found.blur, false, detection.residuals);
+  }
   if (plane) take(*plane);
 }
 

@@ -14,7 +14,7 @@ constexpr double kPiece = 32;  // px
 // A first look at the edges is the last where it moves none of them by more than this, finds the blur that
 // was expected, to a part of it, and at least this part of the pieces of the target's own edges.
 constexpr double kStill = 0.3;  // px
-constexpr double kSameBlur = 0.15, kMostPieces = 0.9;
+constexpr double kMostPieces = 0.9;
 constexpr int kMostLooks = 3;
 
 // How far a fit to a blurred step is off one bent by the sensor's response differs by its reach: by this part
@@ -62,26 +62,31 @@ const TargetShape& EdgesMeasurement::shape_of(const EdgePiece& piece) const {
   return edges_.shapes[static_cast<size_t>(edges_.edges[static_cast<size_t>(piece.edge)].shape)];
 }
 
-bool EdgesMeasurement::is_in_view(const Eigen::Matrix3d& image_from_plane) {
-  project_edges(edges_, image_from_plane, camera_, kWhole, pieces_);
-  return is_all_in_view();
-}
-
 // Whether the whole target is: both ends of each of its own edges.
 bool EdgesMeasurement::is_all_in_view() const {
+  const auto is_seen = [&](const Eigen::Vector2d& pixel) {
+    return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera_.width() - 1 &&
+           pixel.y() <= camera_.height() - 1;
+  };
   std::ptrdiff_t ends = 0;
   for (const EdgePiece& piece : pieces_) {
-    if (!is_ground(shape_of(piece))) ends += piece.first + piece.last;
+    if (is_ground(shape_of(piece))) continue;
+    ends += piece.first && is_seen(piece.begin);
+    ends += piece.last && is_seen(piece.end);
   }
   const auto grounds = std::ranges::count_if(edges_.shapes, is_ground);
   return ends == 2 * (std::ssize(edges_.edges) - 4 * grounds);
 }
 
-// Those of a nested target that is still too small for it are not asked for.
-void EdgesMeasurement::drop_narrow_pieces(double blur_px) {
+// Those of a nested target that is still too small for it are not asked for. False where the hole's are among
+// them, which alone tell the outer target from the inner one.
+bool EdgesMeasurement::drop_narrow_pieces(double blur_px) {
+  const auto is_hole = [&](const EdgePiece& piece) { return shape_of(piece).kind == ShapeKind::kHole; };
+  const auto holes = std::ranges::count_if(pieces_, is_hole);
   std::erase_if(pieces_, [&](const EdgePiece& piece) {
     return shape_of(piece).inner && !EdgeFit::has_room(piece, blur_px);
   });
+  return std::ranges::count_if(pieces_, is_hole) == holes;
 }
 
 // Of the target's own edges: the ground beside its outline may be as pale.
@@ -110,7 +115,7 @@ std::optional<PlaneMeasurement> EdgesMeasurement::measure(const cv::Mat& grey,
     plane.frame = frame_of(H, Eigen::Vector2d::Zero(), size_);
     project_edges(edges_, H, camera_, kPiece, pieces_);
     if (must_confirm && !is_all_in_view()) return std::nullopt;
-    drop_narrow_pieces(how.blur);
+    if (!drop_narrow_pieces(how.blur) && must_confirm) return std::nullopt;
     on_ground_.clear();
     for (const EdgePiece& piece : pieces_) on_ground_.push_back(is_ground(shape_of(piece)));
     how.least_measured = must_confirm ? kMostPieces : 0;

@@ -12,6 +12,9 @@
 
 namespace perch {
 
+// Blurs that differ by no more than this part of one are the same.
+inline constexpr double kSameBlur = 0.15;
+
 // Measures a target by the places of its edges, to a few hundredths of a pixel each. Holds its working
 // memory.
 class EdgesMeasurement {
@@ -28,13 +31,10 @@ class EdgesMeasurement {
                                           double blur_px, bool must_confirm,
                                           std::vector<EdgeResidual>& residuals);
 
-  // Whether the whole target is, but for its outline.
-  bool is_in_view(const Eigen::Matrix3d& image_from_plane);
-
  private:
   const TargetShape& shape_of(const EdgePiece& piece) const;
   bool is_all_in_view() const;
-  void drop_narrow_pieces(double blur_px);
+  bool drop_narrow_pieces(double blur_px);
   void share_growth();
   bool is_most_measured() const;
 

@@ -133,11 +133,21 @@ void Hypotheses::match(int scale, const Eigen::Matrix3d& H, double tolerance) {
   }
 }
 
+bool Hypotheses::has_corners(const Match& match) const {
+  return quads_[match.quad].four_sided && quads_[match.quad].side_px >= kByCorners;
+}
+
 // Three squares, or two with eight corners.
-bool Hypotheses::is_enough(std::span<const Match> matches) const {
-  return matches.size() >= 3 || (matches.size() == 2 && std::ranges::all_of(matches, [&](const Match& m) {
-                                   return quads_[m.quad].four_sided && quads_[m.quad].side_px >= kByCorners;
-                                 }));
+bool Hypotheses::is_enough() const {
+  return matches_.size() >= 3 || (matches_.size() == 2 && std::ranges::all_of(matches_, [&](const Match& m) {
+                                    return has_corners(m);
+                                  }));
+}
+
+// Five centres, or eight corners.
+bool Hypotheses::is_firm(std::span<const Match> matches) const {
+  return matches.size() >= 5 ||
+         std::ranges::count_if(matches, [&](const Match& m) { return has_corners(m); }) >= 2;
 }
 
 // Those that the picture's edge cuts last; how many it does not.
@@ -150,10 +160,10 @@ size_t Hypotheses::sort_cut() {
 std::optional<Eigen::Matrix3d> Hypotheses::fitted(const Eigen::Matrix3d& H) {
   plane_.clear();
   image_.clear();
-  // What is seen of one that is cut has another centre and other corners: it counts where there is little
-  // else.
+  // What is seen of one that is cut has another centre and other corners: it counts where the others alone
+  // leave the perspective open.
   std::span<const Match> used(matches_.data(), sort_cut());
-  if (!is_enough(used)) used = matches_;
+  if (!is_firm(used)) used = matches_;
   for (const auto& [square, quad] : used) {
     const Mark& m = marks_[quad];
     plane_.push_back(square->centre);
@@ -209,7 +219,7 @@ std::optional<Hypothesis> Hypotheses::refined(int scale, const Eigen::Matrix3d& 
   Eigen::Matrix3d H = first;
   for (const double tolerance : {0.45, 0.3}) {  // of a square's side
     match(scale, H, tolerance);
-    if (!is_enough(matches_)) return std::nullopt;
+    if (!is_enough()) return std::nullopt;
     const auto better = fitted(H);
     if (!better) return std::nullopt;
     H = towards_camera(*better);

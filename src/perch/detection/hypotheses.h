@@ -64,7 +64,9 @@ class Hypotheses {
   };
   std::optional<size_t> nearest_to(const Eigen::Vector2d& place, double reach, const SideBounds& side) const;
   void match(int scale, const Eigen::Matrix3d& H, double tolerance);
-  bool is_enough(std::span<const Match> matches) const;
+  bool has_corners(const Match& match) const;
+  bool is_enough() const;
+  bool is_firm(std::span<const Match> matches) const;
   size_t sort_cut();
   std::optional<Eigen::Matrix3d> fitted(const Eigen::Matrix3d& H);
   std::optional<Eigen::Matrix3d> by_centres();

@@ -10,6 +10,7 @@
 
 #include "perch/detection/confirm.h"
 #include "perch/detection/edge_blur.h"
+#include "perch/detection/sum_in_order.h"
 
 namespace perch {
 namespace {
@@ -45,8 +46,8 @@ class Products {
   void take(Normal& A, Unknowns& b) const {
     const Four* sum = sums_.data();
     for (int i = 0; i < kUnknowns; ++i) {
-      for (int k = i; k < kUnknowns; ++k) A(i, k) = A(k, i) = static_cast<double>(cv::v_reduce_sum(*sum++));
-      b(i) = static_cast<double>(cv::v_reduce_sum(*sum++));
+      for (int k = i; k < kUnknowns; ++k) A(i, k) = A(k, i) = static_cast<double>(sum_in_order(*sum++));
+      b(i) = static_cast<double>(sum_in_order(*sum++));
     }
   }
 
@@ -77,7 +78,7 @@ Four grey_of(const uint8_t* line, int x, int width) {
 }
 
 double sum_of(const Four& mask, const Four& values) {
-  return static_cast<double>(cv::v_reduce_sum(mask & values));
+  return static_cast<double>(sum_in_order(mask & values));
 }
 
 int count_of(const Four& mask) { return std::popcount(static_cast<unsigned>(cv::v_signmask(mask))); }
@@ -169,7 +170,8 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
   bool done = false;
   for (int round = 0; round < kMostPasses && !done; ++round) {
     fitted.frame = frame_of(H, Eigen::Vector2d::Zero(), size);
-    if (!model_.set(H, fitted.frame, p)) return std::nullopt;
+    is_outside_ = !model_.set(H, fitted.frame, p);
+    if (is_outside_) return std::nullopt;
     // The first look finds the levels, in which the picture is linear: without any no edge moves it.
     const Pass pass = take(grey, noise, round == 0);
     information = pass.A;
@@ -196,7 +198,7 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
     held(6, 6) += std::pow(kSteepest * fitted.frame.radius, -2);
     held(7, 7) += std::pow(kSteepest * fitted.frame.radius, -2);
     held.diagonal().array() += 1e-9 * held.diagonal().tail<7>().maxCoeff();
-    Unknowns x = held.ldlt().solve(pass.b + towards);
+    const Unknowns x = lengthening(pass) * held.ldlt().solve(pass.b + towards);
     if (!x.allFinite()) return std::nullopt;
     p.white += x.segment<3>(PictureRows::kWhite);
     p.black += x(PictureRows::kBlack);
@@ -204,7 +206,6 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
     if (round == 0) continue;
     noise = noise_of(pass);
     noise.together = texture_together(0.5 * p.blur.trace());
-    x *= lengthening(pass);
     const PlaneStep step = x.head<8>();
     H = towards_camera(corrected(H, fitted.frame, step));
     const double mean = 0.5 * p.blur.trace() + x(8), most = 0.9 * std::max(mean, 0.1);
@@ -221,7 +222,7 @@ std::optional<PictureFitted> PictureFit::fit(const cv::Mat& grey, const Eigen::M
   }
   const double step = p.white.x() - p.black;
   // More of it, and the picture is not what the model says it is.
-  constexpr double kMostTogether = 3;
+  constexpr double kMostTogether = 10;
   if (!done || !(step > contrast) || fitted.together > kMostTogether) return std::nullopt;
   constexpr int kRest = kUnknowns - 8;
   const Eigen::Matrix<double, 8, kRest> by_rest = information.topRightCorner<8, kRest>();

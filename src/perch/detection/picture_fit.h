@@ -32,6 +32,9 @@ class PictureFit {
   std::optional<PictureFitted> fit(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane, double size,
                                    double blur_px, double contrast);
 
+  // Whether the last one was not wholly in the picture, with a little ground around it.
+  bool is_outside() const { return is_outside_; }
+
  private:
   struct Noise {
     double pixel = 4, ground = 0;  // variance of a pixel; of the ground's texture, grey levels squared
@@ -44,6 +47,7 @@ class PictureFit {
   static double together(const Pass& pass);
 
   PictureModel model_;
+  bool is_outside_ = false;
 };
 
 }  // namespace perch

@@ -30,9 +30,9 @@ struct PictureRows {
   static constexpr int kUnknowns = 20, kResidual = 20, kColumns = 21;
   std::array<Four, kColumns> d;  // where all are flat, those of step, blur and growth are not set
   Four ground;                   // how much of a pixel is ground
-  Four asked;                    // all bits set, or none: farther off the target than its levels are worth
-  Four crossed;                  // the same: an edge is near
-  bool flat = true;              // no edge is near any of them
+  Four asked;        // all bits set; none: beyond the last column, or farther off than the levels are worth
+  Four crossed;      // the same: an edge is near
+  bool flat = true;  // no edge is near any of them
 };
 
 // The picture of a target of squares as its grey levels, from a homography, blur and three levels: each shape
@@ -73,7 +73,6 @@ class PictureModel {
     std::array<std::array<float, 3>, 4> corner_by_blur;  // of that, as Edge::by_blur
     float low_x, low_y, high_x, high_y;
     float white = 1;      // 1: white on what is around it, -1: black
-    float grows = 1;      // 1: outwards when white grows
     bool ground = false;  // what is around it is the ground
     float room = 1e9F;    // outside, beyond which nothing is asked of a pixel, px
   };

@@ -9,6 +9,8 @@
 #include <opencv2/core/hal/intrin.hpp>
 #include <span>
 
+#include "perch/detection/sum_in_order.h"
+
 namespace perch {
 namespace {
 
@@ -95,7 +97,7 @@ float residual_of(const Row& row, const std::array<float, 12>& x) {
   const cv::v_float32x4 products = cv::v_load(row.data()) * cv::v_load(x.data()) +
                                    cv::v_load(row.data() + 4) * cv::v_load(x.data() + 4) +
                                    cv::v_load(row.data() + 8) * cv::v_load(x.data() + 8);
-  return -cv::v_reduce_sum(products);
+  return -sum_in_order(products);
 }
 
 // The median of |residual| as a standard deviation, to 3 %: from a histogram of their logarithms, which a
@@ -191,6 +193,7 @@ PlaneFit fit_plane(std::vector<EdgeOffset>& offsets, const ImageFrame& frame, do
     x = llt.solve(M.topRightCorner<10, 1>().eval());
     if (llt.info() != Eigen::Success || !x.allFinite()) {
       x.setZero();
+      std::fill_n(step.begin(), 10, 0.0F);
       break;
     }
     for (int i = 0; i < 10; ++i) step[static_cast<size_t>(i)] = static_cast<float>(x(i));

@@ -25,9 +25,10 @@ class TargetArea {
   // ours do.
   bool is_stranger(const WhiteQuad& quad) const;
 
-  // The square that was not seen and in which a four-sided region lies, much smaller than it.
   // Whether the region is of about a square's size, and too far off the middle of its place to be it.
   bool is_beside(const WhiteQuad& quad) const;
+
+  // The square that was not seen and in which a four-sided region lies, much smaller than it.
   std::optional<size_t> piece_of(const WhiteQuad& quad) const;
 
  private:
