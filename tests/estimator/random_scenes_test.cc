@@ -24,7 +24,7 @@ struct Kind {
 const Kind kKinds[] = {
     {"Plain", {}, 1},
     {"Small", {.smallest_px = 2.5, .largest_px = 4, .steepest = 0.7}, 0.97},
-    {"Large", {.smallest_px = 40, .largest_px = 120, .steepest = 0.7, .cut = true}, 0.9},
+    {"Large", {.smallest_px = 40, .largest_px = 120, .steepest = 0.7, .cut = true}, 0.97},
     {"Steep", {.smallest_px = 3, .largest_px = 30, .steepest = 75 * kRadFromDeg}, 0.95},
     {"Covered", {.covered = true}, 0.9},
     {"Cut", {.cut = true}, 0.97},

@@ -78,10 +78,7 @@ bool Confirmation::has_small_squares(const ImageFrame& frame) const {
 // Whether the last look shows the target as a whole, and nearly all of it where it should be.
 bool Confirmation::is_plain(const ImageFrame& frame, int lines) const {
   if (has_small_squares(frame)) return false;
-  const auto is_ground = [&](size_t edge) {
-    const TargetShape& shape = target_.shapes[edge / 4];
-    return shape.kind == ShapeKind::kOutline && !shape.inner;
-  };
+  const auto is_ground = [&](size_t edge) { return target_.shapes[edge / 4].is_on_ground(); };
   int asked = 0, found = 0;
   for (size_t i = 0; i < tallies_.size(); ++i) {
     if (is_ground(i)) continue;
@@ -113,7 +110,7 @@ bool Confirmation::is_met(const cv::Mat& grey, const Eigen::Matrix3d& H, const R
     for (size_t k = 4 * i; k < 4 * i + 4; ++k) {
       const EdgeTally& tally = tallies_[k];
       // The ground beside the outline may be as pale: nobody can ask for that.
-      if (kind != ShapeKind::kOutline || target_.shapes[i].inner) {
+      if (!target_.shapes[i].is_on_ground()) {
         found += tally.found;
         asked += tally.asked;
       }

@@ -24,9 +24,6 @@ constexpr double kBent = 0.1;
 // No lens is sharper, its pixels included; what seems to be is drawn without a lens.
 constexpr double kSharpest = 0.45;  // px
 
-// Whether edges of the shape lie between the target and the ground.
-bool is_ground(const TargetShape& shape) { return shape.kind == ShapeKind::kOutline && !shape.inner; }
-
 // By what the sigmas of so many offsets are to be multiplied, whose scatter about the fit is `scale` sigmas.
 // Where they scatter less, as the noise of the dark is not that of an edge's middle, the fit has taken a part
 // of the scatter, and a few tell it roughly.
@@ -70,11 +67,11 @@ bool EdgesMeasurement::is_all_in_view() const {
   };
   std::ptrdiff_t ends = 0;
   for (const EdgePiece& piece : pieces_) {
-    if (is_ground(shape_of(piece))) continue;
+    if (shape_of(piece).is_on_ground()) continue;
     ends += piece.first && is_seen(piece.begin);
     ends += piece.last && is_seen(piece.end);
   }
-  const auto grounds = std::ranges::count_if(edges_.shapes, is_ground);
+  const auto grounds = std::ranges::count_if(edges_.shapes, &TargetShape::is_on_ground);
   return ends == 2 * (std::ssize(edges_.edges) - 4 * grounds);
 }
 
@@ -117,7 +114,7 @@ std::optional<PlaneMeasurement> EdgesMeasurement::measure(const cv::Mat& grey,
     if (must_confirm && !is_all_in_view()) return std::nullopt;
     if (!drop_narrow_pieces(how.blur) && must_confirm) return std::nullopt;
     on_ground_.clear();
-    for (const EdgePiece& piece : pieces_) on_ground_.push_back(is_ground(shape_of(piece)));
+    for (const EdgePiece& piece : pieces_) on_ground_.push_back(shape_of(piece).is_on_ground());
     how.least_measured = must_confirm ? kMostPieces : 0;
     edge_fit_.measure(grey, pieces_, on_ground_, plane.frame, how, offsets_, measured_);
     if (offsets_.size() < 10) return std::nullopt;

@@ -129,7 +129,7 @@ bool PictureModel::set(const Eigen::Matrix3d& H, const ImageFrame& frame,
     }
     const bool white = shape.kind == ShapeKind::kSquare || shape.kind == ShapeKind::kOutline;
     seen.white = white ? 1 : -1;
-    seen.ground = shape.kind == ShapeKind::kOutline && !shape.inner;
+    seen.ground = shape.is_on_ground();
     has_ground_ = has_ground_ || seen.ground;
     // White has grown by so much: the edges lie farther out.
     const double out = parameters.growth + (seen.ground ? parameters.outline_growth : 0);

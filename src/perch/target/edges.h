@@ -20,6 +20,8 @@ struct TargetShape {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  // m
   double side = 0;                                   // m
   bool inner = false;                                // of the nested target
+  // Whether its edges lie between the target and the ground.
+  bool is_on_ground() const { return kind == ShapeKind::kOutline && !inner; }
 };
 
 // One side of a shape, in the target's plane, m.
